@@ -1,0 +1,40 @@
+# Settings of every target of ours, given per target so that a project which adds libloc as a
+# subfolder keeps its own flags.
+
+set(loc_sanitize_flags "")
+if(LOC_SANITIZE)
+  set(loc_sanitize_flags -fsanitize=${LOC_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+endif()
+
+# One setting for the whole program: objects built for different vector widths that exchange Eigen
+# types disagree on alignment. PUBLIC, so that a user's own files agree too.
+set(loc_arch_flags "")
+if(LOC_NATIVE)
+  set(loc_arch_flags -march=native)
+endif()
+
+function(loc_target_options target)
+  set_target_properties(${target} PROPERTIES CXX_STANDARD 20 CXX_STANDARD_REQUIRED ON CXX_EXTENSIONS OFF
+                        POSITION_INDEPENDENT_CODE ON)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
+                         -Wnon-virtual-dtor -Woverloaded-virtual -Werror ${loc_sanitize_flags})
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+    target_compile_options(${target} PRIVATE -Wno-restrict)  # false alarms on std::string: GCC bug 105651
+  endif()
+  target_link_options(${target} PRIVATE ${loc_sanitize_flags})
+  get_target_property(type ${target} TYPE)
+  if(NOT type STREQUAL "INTERFACE_LIBRARY")
+    target_compile_options(${target} PUBLIC ${loc_arch_flags})
+    target_compile_features(${target} PUBLIC cxx_std_20)
+  endif()
+endfunction()
+
+# Includes are written "libloc/…", "msgs/…", "loc/…" (generated), in this tree and when installed.
+function(loc_library target)
+  add_library(${target} STATIC ${ARGN})
+  add_library(libloc::${target} ALIAS ${target})
+  loc_target_options(${target})
+  target_include_directories(${target} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/libloc>)
+  set_property(GLOBAL APPEND PROPERTY LOC_INSTALL_TARGETS ${target})
+endfunction()

@@ -1,0 +1,58 @@
+// What every estimator gives out: one struct, so that programs, logs and evaluation do not care which estimator it was.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+
+#include "libloc/core/time.hpp"
+
+namespace loc {
+
+/// Which parts of an Estimate hold something; the others are NaN.
+enum EstimateValid : std::uint32_t {
+  kValidOrientation = 1U << 0U,
+  kValidHeading =
+      1U << 1U,  ///< The heading is tied to north (magnetometer, GPS); otherwise it is relative to the start.
+  kValidPosition = 1U << 2U,
+  kValidVelocity = 1U << 3U,
+  kValidGyroscopeBias = 1U << 4U,
+  kValidAccelerometerBias = 1U << 5U,
+  kValidCovariance = 1U << 6U,
+};
+
+/// What an estimator did with its last input, and why. Zero is the normal case.
+enum EstimateStatus : std::uint32_t {
+  kInitialising = 1U << 0U,           ///< No estimate yet.
+  kReinitialised = 1U << 1U,          ///< Started anew at this sample (after a gap).
+  kAtRest = 1U << 2U,                 ///< Rest detected.
+  kAccelerometerIgnored = 1U << 3U,   ///< Zero, saturated or outside its gate.
+  kMagnetometerIgnored = 1U << 4U,    ///< Zero, or parallel to gravity: no heading in it.
+  kMagnetometerDisturbed = 1U << 5U,  ///< Norm or dip away from its reference: rejected.
+  kMagnetometerMissing = 1U << 6U,    ///< None yet or too old: heading from the gyroscope alone.
+  kNotFinite = 1U << 7U,              ///< Input skipped: NaN or infinity.
+  kTimeNotIncreasing = 1U << 8U,      ///< Input skipped: its time is not after the last one's.
+  kGap = 1U << 9U,                    ///< Time since the last sample is past the limit.
+};
+
+/// Error-state order of the covariance: theta, position, velocity, gyroscope bias, accelerometer bias.
+inline constexpr int kMaxEstimateDim = 15;
+
+struct Estimate {
+  TimeNs time_ns = kNoTime;       ///< Of the measurement that it rests upon.
+  TimeNs host_time_ns = kNoTime;  ///< Arrival of that measurement.
+  std::int64_t sequence = -1;     ///< Its sequence number.
+  std::uint32_t valid = 0;        ///< EstimateValid
+  std::uint32_t status = 0;       ///< EstimateStatus
+  Eigen::Quaterniond q_world_body{1, 0, 0, 0};
+  Eigen::Vector3d position;            ///< of body in world [m]
+  Eigen::Vector3d velocity;            ///< in world [m/s]
+  Eigen::Vector3d angular_velocity;    ///< of body in body axes, bias removed [rad/s]
+  Eigen::Vector3d gyroscope_bias;      ///< [rad/s]
+  Eigen::Vector3d accelerometer_bias;  ///< [m/s^2]
+  /// Of the error (theta [rad, body axes], p, v, bg, ba); the first covariance_dim rows and columns hold something.
+  Eigen::Matrix<double, kMaxEstimateDim, kMaxEstimateDim> covariance;
+  int covariance_dim = 0;
+};
+
+}  // namespace loc

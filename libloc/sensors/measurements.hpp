@@ -1,0 +1,105 @@
+// The plain structs that every stream is made of. Drivers, readers and the simulator make them, estimators take them:
+// an estimator cannot tell which of them it was. SI units and radians. Frames: libloc/README.md.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "libloc/core/time.hpp"
+
+namespace loc {
+
+/// What every measurement carries about its time and its place in the stream.
+struct Stamp {
+  TimeNs time_ns = kNoTime;       ///< Time of measurement, on the clock that the whole recording shares.
+  TimeNs host_time_ns = kNoTime;  ///< Arrival at the host, host clock; kNoTime when unknown.
+  std::int64_t sequence = -1;     ///< Counts the samples of one stream from 0; a jump is a loss. -1 when unknown.
+};
+
+/// One IMU sample, in the body frame (= axes of the IMU).
+struct ImuMeasurement : Stamp {
+  Eigen::Vector3d angular_velocity;  ///< [rad/s]
+  Eigen::Vector3d specific_force;    ///< [m/s^2], at rest +9.81 upwards
+};
+
+/// One magnetometer sample, in the body frame once the rig's alignment is applied.
+struct MagnetometerMeasurement : Stamp {
+  Eigen::Vector3d magnetic_field;  ///< [T]
+};
+
+/// Layout of the bytes of an image; the values are the fourcc codes that V4L2 and LCM's bot_core use.
+enum class PixelFormat : std::int32_t {
+  kGray = 0x59455247,  ///< "GREY", one byte a pixel
+  kBgr = 0x33524742,   ///< "BGR3"
+  kRgb = 0x33424752,   ///< "RGB3"
+  kMjpeg = 0x47504a4d  ///< "MJPG", one JPEG picture
+};
+
+/// One picture. Pixel (0,0) is the centre of the top-left pixel.
+struct ImageMeasurement : Stamp {
+  std::int32_t camera = 0;  ///< Index of the camera in the rig.
+  std::int32_t width_px = 0;
+  std::int32_t height_px = 0;
+  std::int32_t row_stride_bytes = 0;  ///< 0 for JPEG
+  PixelFormat format = PixelFormat::kGray;
+  TimeNs exposure_ns = 0;  ///< Length of the exposure; 0 when unknown. time_ns is its middle.
+  std::shared_ptr<const std::vector<std::uint8_t>> data;
+};
+
+enum class GpsFixType : std::int8_t {
+  kNone = 0,
+  kTime = 1,
+  k2d = 2,
+  k3d = 3,
+  kDifferential = 4,
+  kFloat = 5,
+  kFixed = 6
+};
+
+/// One GPS fix. What a receiver did not say is NaN (or kNoTime, -1).
+struct GpsMeasurement : Stamp {
+  GpsFixType fix = GpsFixType::kNone;
+  std::int32_t satellites = -1;
+  TimeNs gps_time_ns = kNoTime;  ///< Since 1980-01-06 00:00:00 UTC, without leap seconds.
+  double latitude = 0;           ///< [rad], WGS 84
+  double longitude = 0;          ///< [rad]
+  double altitude = 0;           ///< [m] above the ellipsoid
+  Eigen::Matrix3d position_cov;  ///< [m^2], east, north, up
+  Eigen::Vector3d velocity_enu;  ///< [m/s], east, north, up
+  Eigen::Matrix3d velocity_cov;  ///< [m^2/s^2]
+};
+
+/// Pose by a reference system (motion capture, reference INS): truth for evaluation, never seen by an estimator under
+/// test. What the reference does not know is NaN.
+struct ReferenceMeasurement : Stamp {
+  Eigen::Quaterniond q_world_body;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of body in world [m]
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< in world [m/s]
+  bool score = true;                                   ///< False where the recording says: do not score here.
+};
+
+/// One sample of any stream.
+using Measurement =
+    std::variant<ImuMeasurement, MagnetometerMeasurement, ImageMeasurement, GpsMeasurement, ReferenceMeasurement>;
+
+/// Index of the alternatives above; names for reports.
+enum class StreamKind : std::uint8_t { kImu = 0, kMagnetometer = 1, kImage = 2, kGps = 3, kReference = 4 };
+inline constexpr std::size_t kStreamKinds = std::variant_size_v<Measurement>;
+const char* stream_name(StreamKind kind);
+
+inline StreamKind kind_of(const Measurement& m) {
+  return static_cast<StreamKind>(m.index());
+}
+inline const Stamp& stamp_of(const Measurement& m) {
+  return std::visit([](const auto& x) -> const Stamp& { return x; }, m);
+}
+inline Stamp& stamp_of(Measurement& m) {
+  return std::visit([](auto& x) -> Stamp& { return x; }, m);
+}
+
+}  // namespace loc

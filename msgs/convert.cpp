@@ -1,0 +1,269 @@
+#include "msgs/convert.hpp"
+
+#include <algorithm>
+
+#include "libloc/core/check.hpp"
+
+namespace loc {
+namespace {
+
+template <class Message>
+void stamp_to(const Stamp& stamp, Message& m) {
+  m.time_ns = stamp.time_ns;
+  m.host_time_ns = stamp.host_time_ns;
+  m.sequence = stamp.sequence;
+}
+
+template <class Message>
+void stamp_from(const Message& m, const char* type, Stamp& stamp) {
+  if (m.time_ns == kNoTime) throw DataError(std::string(type) + ".time_ns = INT64_MIN: a measurement must have a time");
+  stamp.time_ns = m.time_ns;
+  stamp.host_time_ns = m.host_time_ns;
+  stamp.sequence = m.sequence;
+}
+
+template <class Vector>
+void vector_to(const Vector& v, double* out) {
+  std::copy(v.data(), v.data() + v.size(), out);
+}
+
+Eigen::Vector3d vector_from(const double* in) {
+  return {in[0], in[1], in[2]};
+}
+
+void matrix_to(const Eigen::Matrix3d& m, double (*out)[3]) {
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) out[i][j] = m(i, j);
+  }
+}
+
+Eigen::Matrix3d matrix_from(const double (*in)[3]) {
+  Eigen::Matrix3d m;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) m(i, j) = in[i][j];
+  }
+  return m;
+}
+
+void quaternion_to(const Eigen::Quaterniond& q, double* wxyz) {
+  wxyz[0] = q.w();
+  wxyz[1] = q.x();
+  wxyz[2] = q.y();
+  wxyz[3] = q.z();
+}
+
+Eigen::Quaterniond quaternion_from(const double* wxyz) {
+  return {wxyz[0], wxyz[1], wxyz[2], wxyz[3]};
+}
+
+[[noreturn]] void reject(const char* field, std::int64_t value, const char* rule) {
+  throw DataError(std::string(field) + " = " + std::to_string(value) + ": " + rule);
+}
+
+}  // namespace
+
+imu_t to_message(const ImuMeasurement& m) {
+  imu_t out{};
+  stamp_to(m, out);
+  vector_to(m.angular_velocity, out.angular_velocity);
+  vector_to(m.specific_force, out.specific_force);
+  return out;
+}
+
+magnetometer_t to_message(const MagnetometerMeasurement& m) {
+  magnetometer_t out{};
+  stamp_to(m, out);
+  vector_to(m.magnetic_field, out.magnetic_field);
+  return out;
+}
+
+image_t to_message(const ImageMeasurement& m) {
+  image_t out{};
+  stamp_to(m, out);
+  out.exposure_ns = m.exposure_ns;
+  out.camera = m.camera;
+  out.width = m.width_px;
+  out.height = m.height_px;
+  out.row_stride = m.row_stride_bytes;
+  out.pixelformat = static_cast<std::int32_t>(m.format);
+  if (m.data) out.data = *m.data;
+  out.size = static_cast<std::int32_t>(out.data.size());
+  return out;
+}
+
+gps_fix_t to_message(const GpsMeasurement& m) {
+  gps_fix_t out{};
+  stamp_to(m, out);
+  out.gps_time_ns = m.gps_time_ns;
+  out.fix_type = static_cast<std::int8_t>(m.fix);
+  out.satellites = m.satellites;
+  out.latitude = m.latitude;
+  out.longitude = m.longitude;
+  out.altitude = m.altitude;
+  matrix_to(m.position_cov, out.position_cov);
+  vector_to(m.velocity_enu, out.velocity_enu);
+  matrix_to(m.velocity_cov, out.velocity_cov);
+  return out;
+}
+
+reference_t to_message(const ReferenceMeasurement& m) {
+  reference_t out{};
+  stamp_to(m, out);
+  quaternion_to(m.q_world_body, out.q_world_body_wxyz);
+  vector_to(m.position, out.position);
+  vector_to(m.velocity, out.velocity);
+  out.score = m.score ? 1 : 0;
+  return out;
+}
+
+estimate_t to_message(const Estimate& e, const std::string& method, const std::string& world) {
+  estimate_t out{};
+  out.time_ns = e.time_ns;
+  out.host_time_ns = e.host_time_ns;
+  out.sequence = e.sequence;
+  out.publish_time_ns = kNoTime;
+  out.method = method;
+  out.world = world;
+  out.valid = static_cast<std::int32_t>(e.valid);
+  out.status = static_cast<std::int32_t>(e.status);
+  quaternion_to(e.q_world_body, out.q_world_body_wxyz);
+  vector_to(e.position, out.position);
+  vector_to(e.velocity, out.velocity);
+  vector_to(e.angular_velocity, out.angular_velocity);
+  vector_to(e.gyroscope_bias, out.gyroscope_bias);
+  vector_to(e.accelerometer_bias, out.accelerometer_bias);
+  out.covariance_dim = e.covariance_dim;
+  out.covariance.assign(static_cast<std::size_t>(e.covariance_dim),
+                        std::vector<double>(static_cast<std::size_t>(e.covariance_dim)));
+  for (int i = 0; i < e.covariance_dim; ++i) {
+    for (int j = 0; j < e.covariance_dim; ++j) {
+      out.covariance[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] = e.covariance(i, j);
+    }
+  }
+  return out;
+}
+
+ImuMeasurement from_message(const imu_t& m) {
+  ImuMeasurement out;
+  stamp_from(m, "imu_t", out);
+  out.angular_velocity = vector_from(m.angular_velocity);
+  out.specific_force = vector_from(m.specific_force);
+  return out;
+}
+
+MagnetometerMeasurement from_message(const magnetometer_t& m) {
+  MagnetometerMeasurement out;
+  stamp_from(m, "magnetometer_t", out);
+  out.magnetic_field = vector_from(m.magnetic_field);
+  return out;
+}
+
+ImageMeasurement from_message(const image_t& m) {
+  ImageMeasurement out;
+  stamp_from(m, "image_t", out);
+  if (m.width <= 0) reject("image_t.width", m.width, "must be positive");
+  if (m.height <= 0) reject("image_t.height", m.height, "must be positive");
+  if (m.size < 0 || static_cast<std::size_t>(m.size) != m.data.size()) {
+    reject("image_t.size", m.size, "must be the number of bytes");
+  }
+  std::int64_t bytes_per_pixel = 0;
+  switch (static_cast<PixelFormat>(m.pixelformat)) {
+    case PixelFormat::kGray:
+      bytes_per_pixel = 1;
+      break;
+    case PixelFormat::kBgr:
+    case PixelFormat::kRgb:
+      bytes_per_pixel = 3;
+      break;
+    case PixelFormat::kMjpeg:
+      break;
+    default:
+      reject("image_t.pixelformat", m.pixelformat, "must be GREY, BGR3, RGB3 or MJPG");
+  }
+  if (bytes_per_pixel > 0) {
+    if (m.row_stride < m.width * bytes_per_pixel) reject("image_t.row_stride", m.row_stride, "is less than one row");
+    const std::int64_t need = static_cast<std::int64_t>(m.row_stride) * (m.height - 1) + m.width * bytes_per_pixel;
+    if (m.size < need) reject("image_t.size", m.size, "is less than the rows of the picture take");
+  } else if (m.size == 0) {
+    reject("image_t.size", m.size, "must be positive");
+  }
+  out.camera = m.camera;
+  out.width_px = m.width;
+  out.height_px = m.height;
+  out.row_stride_bytes = m.row_stride;
+  out.format = static_cast<PixelFormat>(m.pixelformat);
+  out.exposure_ns = m.exposure_ns;
+  out.data = std::make_shared<const std::vector<std::uint8_t>>(m.data);
+  return out;
+}
+
+GpsMeasurement from_message(const gps_fix_t& m) {
+  GpsMeasurement out;
+  stamp_from(m, "gps_fix_t", out);
+  if (m.fix_type < gps_fix_t::FIX_NONE || m.fix_type > gps_fix_t::FIX_FIXED) {
+    reject("gps_fix_t.fix_type", m.fix_type, "is not one of the fix types");
+  }
+  out.fix = static_cast<GpsFixType>(m.fix_type);
+  out.satellites = m.satellites;
+  out.gps_time_ns = m.gps_time_ns;
+  out.latitude = m.latitude;
+  out.longitude = m.longitude;
+  out.altitude = m.altitude;
+  out.position_cov = matrix_from(m.position_cov);
+  out.velocity_enu = vector_from(m.velocity_enu);
+  out.velocity_cov = matrix_from(m.velocity_cov);
+  return out;
+}
+
+ReferenceMeasurement from_message(const reference_t& m) {
+  ReferenceMeasurement out;
+  stamp_from(m, "reference_t", out);
+  out.q_world_body = quaternion_from(m.q_world_body_wxyz);
+  out.position = vector_from(m.position);
+  out.velocity = vector_from(m.velocity);
+  out.score = m.score != 0;
+  return out;
+}
+
+Estimate from_message(const estimate_t& m) {
+  Estimate out;
+  out.time_ns = m.time_ns;
+  out.host_time_ns = m.host_time_ns;
+  out.sequence = m.sequence;
+  out.valid = static_cast<std::uint32_t>(m.valid);
+  out.status = static_cast<std::uint32_t>(m.status);
+  out.q_world_body = quaternion_from(m.q_world_body_wxyz);
+  out.position = vector_from(m.position);
+  out.velocity = vector_from(m.velocity);
+  out.angular_velocity = vector_from(m.angular_velocity);
+  out.gyroscope_bias = vector_from(m.gyroscope_bias);
+  out.accelerometer_bias = vector_from(m.accelerometer_bias);
+  if (m.covariance_dim < 0 || m.covariance_dim > kMaxEstimateDim) {
+    reject("estimate_t.covariance_dim", m.covariance_dim, "must be in [0, 15]");
+  }
+  out.covariance_dim = m.covariance_dim;
+  for (int i = 0; i < m.covariance_dim; ++i) {
+    for (int j = 0; j < m.covariance_dim; ++j) {
+      out.covariance(i, j) = m.covariance[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+    }
+  }
+  return out;
+}
+
+const char* default_channel(StreamKind kind) {
+  switch (kind) {
+    case StreamKind::kImu:
+      return "LOC_IMU";
+    case StreamKind::kMagnetometer:
+      return "LOC_MAGNETOMETER";
+    case StreamKind::kImage:
+      return "LOC_IMAGE";
+    case StreamKind::kGps:
+      return "LOC_GPS";
+    case StreamKind::kReference:
+      return "LOC_REFERENCE";
+  }
+  return "LOC_UNKNOWN";
+}
+
+}  // namespace loc

@@ -1,0 +1,40 @@
+// Between the LCM types (package loc) and the plain structs of libloc: the only place that knows both.
+// from_message() throws DataError, naming the field and its value, for what no sensor can have sent (a size that does
+// not match, a time that is not set); NaN in a measurement passes, because estimators count and report it themselves.
+#pragma once
+
+#include <string>
+
+#include "libloc/estimators/estimate.hpp"
+#include "libloc/sensors/measurements.hpp"
+#include "loc/estimate_t.hpp"
+#include "loc/gps_fix_t.hpp"
+#include "loc/image_t.hpp"
+#include "loc/imu_t.hpp"
+#include "loc/magnetometer_t.hpp"
+#include "loc/reference_t.hpp"
+
+namespace loc {
+
+imu_t to_message(const ImuMeasurement& m);
+magnetometer_t to_message(const MagnetometerMeasurement& m);
+image_t to_message(const ImageMeasurement& m);
+gps_fix_t to_message(const GpsMeasurement& m);
+reference_t to_message(const ReferenceMeasurement& m);
+/// @param method, world as in estimate_t
+estimate_t to_message(const Estimate& e, const std::string& method, const std::string& world);
+
+ImuMeasurement from_message(const imu_t& m);
+MagnetometerMeasurement from_message(const magnetometer_t& m);
+ImageMeasurement from_message(const image_t& m);
+GpsMeasurement from_message(const gps_fix_t& m);
+ReferenceMeasurement from_message(const reference_t& m);
+Estimate from_message(const estimate_t& m);
+
+/// Channel of each stream, unless the user names another: LOC_IMU, LOC_MAGNETOMETER, LOC_IMAGE, LOC_GPS, LOC_REFERENCE.
+const char* default_channel(StreamKind kind);
+inline constexpr const char* kEstimateChannel = "LOC_ESTIMATE";
+inline constexpr const char* kStatisticsChannel = "LOC_STATISTICS";
+inline constexpr const char* kSourceStatusChannel = "LOC_SOURCE_STATUS";
+
+}  // namespace loc
