@@ -5,13 +5,13 @@
 // Estimates q_world_body (takes body to world) and, with rest_bias, the gyroscope's bias. Not observable: heading
 // without magnetometer (then relative to the start), anything about position. No covariance: the filter carries none.
 //
-// One step of length dt (report, equations 42-44, with the slides' alpha_1, alpha_2):
+// One step of length dt (report, section 3, with the weights alpha_1 = 1 - gamma, alpha_2 = gamma):
 //   q_omega = q * Exp(omega dt)                                  gyroscope, exact on SO(3)
 //   q_grad  = q - mu grad/|grad|,  mu = alpha |omega|/2 dt       steepest descent on the direction errors
 //   q       = (1 - gamma) q_omega + gamma q_grad,  gamma = beta / (mu/dt + beta)
 // alpha = infinity is the report's final form, q_omega - beta dt grad/|grad|. The gradient is taken in the tangent
-// space of the unit sphere: the part of the report's 4-vector along q only changes the norm of q, and how large it is
-// depends on how the rotation matrix is written down.
+// space of the unit quaternions: the part of the report's gradient along q turns nothing, and how much of the step it
+// takes away depends on how the rotation matrix is written down.
 #pragma once
 
 #include <Eigen/Core>
@@ -35,42 +35,51 @@ WorldFrame parse_world_frame(std::string_view name);
 struct MadgwickOptions {
   WorldFrame world = WorldFrame::kEnu;
 
-  /// Gain [rad/s]: the rate at which the gradient turns the quaternion, in quaternion units (half the angle's rate).
+  /// Gain: the rate at which the gradient turns the quaternion, half the rate of the angle. [rad/s]
   double beta = 0.1;
-  /// Step factor of the report, > 1. Finite values weaken the gyroscope by mu / (beta dt + mu): 50 and more do little
-  /// harm.
+  /// Step factor of the report, > 1. A finite one weakens the gyroscope by mu / (beta dt + mu); 50 and more do no harm.
   double alpha = std::numeric_limits<double>::infinity();
-  /// The gradient is divided by max(|grad|, soft_gradient), in radians of direction error: 0 is the report (constant
-  /// rate), more makes the correction proportional to the error below it, so that noise near zero is not amplified.
+  /// Error below which the correction is proportional to the error instead of having the constant rate beta, so that
+  /// noise around zero is not amplified. 0 is the report. [rad of the summed direction errors]
   double soft_gradient = 0;
+
+  /// Where in the step from the last sample to this one the attitude is taken with which this one's force and field are
+  /// compared: 0 is its start (the report), 1 its end. Sensors that average over the sampling interval: 0.5.
+  double gradient_phase = 0;
+
+  /// The magnetometer turns the estimate about the vertical only, so that iron cannot tilt it, by
+  /// the same gain whatever the dip. The report: false.
+  bool magnetometer_heading_only = false;
+  /// Weight of the magnetometer's gradient against the accelerometer's. The report: 1.
+  double magnetometer_weight = 1;
+
+  /// Low-pass of the specific force in world axes, where acceleration averages out and gravity stays. 0: none. [s]
+  double accelerometer_time_constant_s = 0;
 
   /// Estimate the gyroscope's bias while at rest.
   bool rest_bias = false;
-  double rest_max_angular_velocity = 0.0349;  ///< [rad/s] (2 deg/s) low-passed rate that counts as rest
-  double rest_max_force_change = 0.5;         ///< [m/s^2] distance of the force from its own mean at rest
-  double rest_min_duration_s = 1.5;           ///< [s] calm that it takes
-  double rest_bias_cutoff_hz = 0.1;           ///< [Hz] low-pass of the bias at rest
-  double max_gyroscope_bias = 0.0349;         ///< [rad/s] bound of the estimate, per axis
+  double rest_max_angular_velocity = 0.035;  ///< At rest the rate stays this close to its low-pass. [rad/s] (2 deg/s)
+  double rest_max_force_change = 0.5;        ///< At rest the force stays this close to its low-pass. [m/s^2]
+  double rest_min_duration_s = 1.5;          ///< Calm for this long is rest. [s]
+  double rest_low_pass_s = 0.5;              ///< Time constant of these low-passes. [s]
+  double rest_bias_cutoff_hz = 0.1;          ///< Low-pass of the rate that becomes the bias. [Hz]
+  double max_gyroscope_bias = 0.035;         ///< A larger low-passed rate is a slow turn, not a bias. [rad/s] (2 deg/s)
 
-  /// Reject the magnetometer where norm or dip differ from the reference that is learnt while it is calm.
+  /// Reject the magnetometer where norm or dip differ from a reference that is learnt while they do not.
   bool magnetic_rejection = false;
-  double magnetic_norm_tolerance = 0.10;   ///< relative
+  double magnetic_norm_tolerance = 0.10;   ///< Relative to the reference.
   double magnetic_dip_tolerance = 0.1745;  ///< [rad] (10 deg)
-  double magnetic_max_rejection_s = 60;    ///< [s] after which a steady new field is accepted
+  double magnetic_reference_time_s = 20;   ///< Time constant with which the reference follows. [s]
+  double magnetic_max_rejection_s = 60;    ///< After this long the field is taken for the new normal. [s]
 
-  /// Time constant of the low-pass on the specific force in world axes [s]; 0 uses each sample as it is.
-  double accelerometer_time_constant_s = 0;
+  double max_gap_s = 1.0;               ///< A longer time between IMU samples starts the filter anew. [s]
+  double max_magnetometer_age_s = 0.5;  ///< Until then a sample is used on, carried along by the gyroscope. [s]
 
-  double max_gap_s = 1.0;  ///< [s] a longer time between IMU samples starts the filter anew
-  double max_magnetometer_age_s =
-      0.5;                   ///< [s] an older sample is not used any more; until then the gyroscope carries it along
-  double gravity = 9.80665;  ///< [m/s^2]
-
-  /// The form of the report: beta = 0.1, nothing else.
+  /// The form of the report: beta = 0.1, all extensions off.
   static MadgwickOptions report();
-  /// Everything on: for real sensors.
+  /// All extensions on: for real sensors.
   static MadgwickOptions robust();
-  /// @throws std::invalid_argument for a name other than "report", "robust".
+  /// @throws std::invalid_argument for a name other than "report" and "robust".
   static MadgwickOptions preset(std::string_view name);
   /// @throws std::invalid_argument naming the field and its value.
   void check() const;
@@ -84,6 +93,19 @@ struct MadgwickOptions {
 /// Source: report, equation 51 (beta = sqrt(3/4) * rate error), the rate error being the root sum of squares of the
 /// parts.
 double beta_from_gyro(const ImuNoise& noise, double bias_residual, double scale_error, double max_rate, double dt_s);
+
+struct MadgwickCounts {
+  std::int64_t imu = 0;             ///< samples that made a step
+  std::int64_t magnetometer = 0;    ///< samples taken
+  std::int64_t imu_not_finite = 0;  ///< skipped
+  std::int64_t imu_time_not_increasing = 0;
+  std::int64_t magnetometer_not_finite = 0;
+  std::int64_t magnetometer_time_not_increasing = 0;
+  std::int64_t gaps = 0;                    ///< new starts after a gap
+  std::int64_t accelerometer_ignored = 0;   ///< steps without
+  std::int64_t magnetometer_ignored = 0;    ///< steps whose field is zero or along gravity
+  std::int64_t magnetometer_disturbed = 0;  ///< steps whose field was rejected
+};
 
 class MadgwickFilter {
  public:
@@ -102,15 +124,64 @@ class MadgwickFilter {
   NamedCounts counts() const;
   void reset();
 
-  bool initialised() const;
+  bool initialised() const { return initialised_; }
   /// q_world_body, w >= 0 is not enforced. Identity before the first IMU sample.
-  const Eigen::Quaterniond& orientation() const;
-  const Eigen::Vector3d& gyroscope_bias() const;  ///< [rad/s]
-  std::uint32_t status() const;                   ///< of the last IMU step
+  const Eigen::Quaterniond& orientation() const { return q_; }
+  const Eigen::Vector3d& gyroscope_bias() const { return bias_; }  ///< [rad/s], zero until known
+  std::uint32_t status() const { return status_; }                 ///< of the last IMU sample
   const MadgwickOptions& options() const { return options_; }
 
  private:
+  std::uint32_t skip(std::uint32_t reason);
+  void start(const ImuMeasurement& imu);
+  void detect_rest(const Eigen::Vector3d& rate, const Eigen::Vector3d& force, double dt);
+  bool magnetic_field_disturbed(double sin_dip, double cos_dip, double dt);
+  bool carry_field(double dt);
+  void turn_to_north();
+  Eigen::Vector3d gravity_gradient(const Eigen::Matrix3d& R, const Eigen::Vector3d& force, double dt);
+  Eigen::Vector3d magnetic_gradient(const Eigen::Matrix3d& R, const Eigen::Vector3d& field_body);
+
   MadgwickOptions options_;
+  // Of world: does z point up; which horizontal axis is north.
+  double up_z_ = 1;
+  int north_axis_ = 1;
+  double cos_dip_tolerance_ = 1;
+
+  // What is known now.
+  Eigen::Quaterniond q_{1, 0, 0, 0};
+  Eigen::Vector3d bias_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rate_ = Eigen::Vector3d::Zero();         // last angular velocity, bias removed
+  Eigen::Vector3d force_world_ = Eigen::Vector3d::Zero();  // low-passed
+  double force_time_s_ = 0;                                // that force_world_ has averaged over
+  std::uint32_t status_ = 0;
+  Stamp last_;
+  bool initialised_ = false;
+  bool heading_known_ = false;
+  bool bias_known_ = false;
+
+  // The newest magnetometer sample, unit length, carried along to the newest IMU sample.
+  Eigen::Vector3d field_ = Eigen::Vector3d::Zero();
+  double field_norm_ = 0;
+  TimeNs field_sample_time_ = kNoTime;  // of the measurement
+  TimeNs field_time_ = kNoTime;         // that field_ is carried to
+  TimeNs field_judged_time_ = kNoTime;  // of the last sample that was compared with the reference
+  bool field_disturbed_ = false;
+
+  // Rest.
+  Eigen::Vector3d rest_rate_ = Eigen::Vector3d::Zero();   // low-passed
+  Eigen::Vector3d rest_force_ = Eigen::Vector3d::Zero();  // low-passed
+  double calm_s_ = 0;
+  double rest_total_s_ = 0;  // of all rest so far
+
+  // Magnetic reference.
+  double reference_norm_ = 0;
+  double reference_sin_dip_ = 0;
+  double reference_cos_dip_ = 1;
+  double rejected_s_ = 0;
+
+  MadgwickCounts counts_;
 };
+
+static_assert(Estimator<MadgwickFilter>);
 
 }  // namespace loc
