@@ -242,6 +242,7 @@ bool MadgwickFilter::carry_field(double dt) {
 
 void MadgwickFilter::turn_to_north() {
   const Eigen::Vector3d field = q_ * field_;
+  if (std::hypot(field.x(), field.y()) < kMinHorizontalField) return;
   const double heading =
       options_.world == WorldFrame::kEnu ? std::atan2(field.x(), field.y()) : std::atan2(-field.y(), field.x());
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitZ()));
@@ -345,7 +346,7 @@ std::uint32_t MadgwickFilter::update(const ImuMeasurement& imu) {
   const bool has_field = carry_field(dt);
   if (!has_field) {
     status_ |= kMagnetometerMissing;
-  } else if (!heading_known_ && field_norm_ > kMinField) {
+  } else if (!heading_known_) {
     turn_to_north();
   }
   const Eigen::Vector3d turn = dt * rate_;
