@@ -82,6 +82,7 @@ MadgwickOptions MadgwickOptions::robust() {
   options.soft_gradient = 0.1;  // with beta: time constant 0.1 / (2 * 0.02) = 2.5 s near the truth
   options.gradient_phase = 0.5;
   options.accelerometer_time_constant_s = 1.5;
+  options.start_time_s = 5;
   options.rest_bias = true;
   options.magnetic_rejection = true;
   options.magnetometer_heading_only = true;
@@ -102,6 +103,7 @@ void MadgwickOptions::check() const {
   require(gradient_phase >= 0 && gradient_phase <= 1, "gradient_phase", gradient_phase, "must be in [0, 1]");
   require_not_negative("magnetometer_weight", magnetometer_weight);
   require_not_negative("accelerometer_time_constant_s", accelerometer_time_constant_s);
+  require_not_negative("start_time_s", start_time_s);
   require_positive("rest_max_angular_velocity", rest_max_angular_velocity);
   require_positive("rest_max_force_change", rest_max_force_change);
   require_positive("rest_min_duration_s", rest_min_duration_s);
@@ -168,6 +170,7 @@ void MadgwickFilter::start(const ImuMeasurement& imu) {
   q_ = Eigen::Quaterniond::FromTwoVectors(imu.specific_force, Eigen::Vector3d(0, 0, up_z_));
   force_world_ = q_ * imu.specific_force;
   force_time_s_ = 0;
+  elapsed_s_ = 0;
   rest_rate_ = imu.angular_velocity;
   rest_force_ = imu.specific_force;
   calm_s_ = 0;
@@ -368,7 +371,15 @@ std::uint32_t MadgwickFilter::update(const ImuMeasurement& imu) {
     weight = gamma * mu;
   }
   if (size > 0) {
-    const Eigen::Vector3d v = weight / size * gradient;
+    Eigen::Vector3d v = weight / size * gradient;
+    if (elapsed_s_ < options_.start_time_s && dt > 0) {
+      elapsed_s_ += dt;
+      // The force is averaged already over its time constant; the mean over all that came goes on from there.
+      const double averaged = std::max(0.0, elapsed_s_ - options_.accelerometer_time_constant_s);
+      const double tilt_gain = std::max(weight / size, 0.5 * dt / (averaged + dt));
+      const double heading_gain = std::max(weight / size, 0.5 * dt / (elapsed_s_ + dt));
+      v = {tilt_gain * gradient.x(), tilt_gain * gradient.y(), heading_gain * gradient.z()};
+    }
     // q + (0, v) * q
     q = Eigen::Quaterniond(
         q.w() - v.x() * q.x() - v.y() * q.y() - v.z() * q.z(), q.x() + v.x() * q.w() + v.y() * q.z() - v.z() * q.y(),

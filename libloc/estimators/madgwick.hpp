@@ -56,6 +56,10 @@ struct MadgwickOptions {
   /// Low-pass of the specific force in world axes, where acceleration averages out and gravity stays. 0: none. [s]
   double accelerometer_time_constant_s = 0;
 
+  /// For this long after the start the correction is at least a mean over all samples so far (gain 1/elapsed), because
+  /// a start in motion is far off and a small beta would take long to mend it. 0: none (the report). [s]
+  double start_time_s = 0;
+
   /// Estimate the gyroscope's bias while at rest.
   bool rest_bias = false;
   double rest_max_angular_velocity = 0.035;  ///< At rest the rate stays this close to its low-pass. [rad/s] (2 deg/s)
@@ -152,6 +156,7 @@ class MadgwickFilter {
   Eigen::Vector3d bias_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d rate_ = Eigen::Vector3d::Zero();         // last angular velocity, bias removed
   Eigen::Vector3d force_world_ = Eigen::Vector3d::Zero();  // low-passed
+  double elapsed_s_ = 0;                                   // since the start
   double force_time_s_ = 0;                                // that force_world_ has averaged over
   std::uint32_t status_ = 0;
   Stamp last_;
