@@ -11,10 +11,17 @@
 namespace loc {
 namespace {
 
-// Regularised lower incomplete gamma function P(a, x); Abramowitz & Stegun 6.5.29 below the mode, the continued
-// fraction 6.5.31 (Lentz's evaluation) above it, where each converges fast.
-double gamma_p(double a, double x) {
-  if (x <= 0) return 0;
+struct GammaTails {
+  double lower;  // P(a, x)
+  double upper;  // Q(a, x) = 1 - P(a, x)
+};
+
+// Regularised incomplete gamma functions; Abramowitz & Stegun 6.5.29 below the mode, the continued fraction 6.5.31
+// (Lentz's evaluation) above it, where each converges fast. The smaller of the two is the one that is computed, so both
+// keep their digits far out in the tails.
+GammaTails gamma_tails(double a, double x) {
+  if (x <= 0) return {0, 1};
+  if (std::isinf(x)) return {1, 0};
   const double scale = std::exp(a * std::log(x) - x - std::lgamma(a));
   constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
   // The number of terms grows with sqrt(a) near the mode.
@@ -26,7 +33,7 @@ double gamma_p(double a, double x) {
       term *= x / (a + n);
       sum += term;
     }
-    return sum * scale;
+    return {sum * scale, 1 - sum * scale};
   }
   constexpr double kTiny = 1e-300;
   double b = x + 1 - a;
@@ -45,7 +52,13 @@ double gamma_p(double a, double x) {
     fraction *= factor;
     if (std::abs(factor - 1) < kEpsilon) break;
   }
-  return 1 - scale * fraction;
+  return {1 - scale * fraction, scale * fraction};
+}
+
+GammaTails chi_square_tails(double x, double dof) {
+  require_positive("dof", dof);
+  require(!std::isnan(x), "x", x, "must be a number");
+  return gamma_tails(dof / 2, x / 2);
 }
 
 }  // namespace
@@ -65,33 +78,44 @@ double mean(std::span<const double> values) {
 double quantile(std::span<const double> values, double probability) {
   require(!values.empty(), "quantile: no values");
   require(probability >= 0 && probability <= 1, "probability", probability, "must be in [0, 1]");
+  // NaN has no place in an order.
+  require(std::none_of(values.begin(), values.end(), [](double v) { return std::isnan(v); }),
+          "quantile: a value is NaN");
   std::vector<double> sorted(values.begin(), values.end());
   const double position = probability * static_cast<double>(sorted.size() - 1);
   const auto below = static_cast<std::size_t>(position);
   const auto nth = sorted.begin() + static_cast<std::ptrdiff_t>(below);
   std::nth_element(sorted.begin(), nth, sorted.end());
-  if (below + 1 == sorted.size()) return *nth;
+  if (position == static_cast<double>(below)) return *nth;
   const double next = *std::min_element(nth + 1, sorted.end());
   return *nth + (position - static_cast<double>(below)) * (next - *nth);
 }
 
 double chi_square_cdf(double x, double dof) {
-  require_positive("dof", dof);
-  require(!std::isnan(x), "x", x, "must be a number");
-  return gamma_p(dof / 2, x / 2);
+  return chi_square_tails(x, dof).lower;
+}
+
+double chi_square_survival(double x, double dof) {
+  return chi_square_tails(x, dof).upper;
 }
 
 double chi_square_quantile(double probability, double dof) {
   require_positive("dof", dof);
   require(probability >= 0 && probability < 1, "probability", probability, "must be in [0, 1)");
+  if (probability == 0) return 0;
+  // Compared in the smaller tail; 1 - probability is exact above one half.
+  const auto is_below = [&](double x) {
+    const GammaTails tails = chi_square_tails(x, dof);
+    return probability > 0.5 ? tails.upper > 1 - probability : tails.lower < probability;
+  };
   double high = dof + 10;
-  while (chi_square_cdf(high, dof) < probability) high *= 2;
+  while (is_below(high)) high *= 2;
   double low = 0;
   // Bisection to the last bit: called when filters are set up, never per measurement.
   for (int i = 0; i < 2000; ++i) {
     const double middle = 0.5 * (low + high);
     if (middle <= low || middle >= high) break;
-    (chi_square_cdf(middle, dof) < probability ? low : high) = middle;
+    (is_below(middle) ? low : high) = middle;
   }
   return 0.5 * (low + high);
 }

@@ -19,7 +19,8 @@ JacobianCoefficients jacobian_coefficients(double t) {
   if (t < kSeriesAngle) {
     return {0.5 - t2 / 24 * (1 - t2 / 30 * (1 - t2 / 56)), (1 - t2 / 20 * (1 - t2 / 42 * (1 - t2 / 72))) / 6};
   }
-  return {(1 - std::cos(t)) / t2, (t - std::sin(t)) / (t2 * t)};
+  const double s = std::sin(0.5 * t);  // 1 - cos t = 2 s^2 keeps its digits
+  return {2 * s * s / t2, (t - std::sin(t)) / (t2 * t)};
 }
 
 }  // namespace
