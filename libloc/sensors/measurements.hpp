@@ -1,10 +1,12 @@
 // The plain structs that every stream is made of. Drivers, readers and the simulator make them, estimators take them:
-// an estimator cannot tell which of them it was. SI units and radians. Frames: libloc/README.md.
+// an estimator cannot tell which of them it was. SI units and radians. Frames: libloc/README.md. What nobody has filled
+// in is NaN.
 #pragma once
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
 #include <variant>
@@ -13,6 +15,9 @@
 #include "libloc/core/time.hpp"
 
 namespace loc {
+
+/// Not measured, not known.
+inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// What every measurement carries about its time and its place in the stream.
 struct Stamp {
@@ -23,13 +28,13 @@ struct Stamp {
 
 /// One IMU sample, in the body frame (= axes of the IMU).
 struct ImuMeasurement : Stamp {
-  Eigen::Vector3d angular_velocity;  ///< [rad/s]
-  Eigen::Vector3d specific_force;    ///< [m/s^2], at rest +9.81 upwards
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Constant(kUnknown);  ///< [rad/s]
+  Eigen::Vector3d specific_force = Eigen::Vector3d::Constant(kUnknown);    ///< [m/s^2], at rest +9.81 upwards
 };
 
 /// One magnetometer sample, in the body frame once the rig's alignment is applied.
 struct MagnetometerMeasurement : Stamp {
-  Eigen::Vector3d magnetic_field;  ///< [T]
+  Eigen::Vector3d magnetic_field = Eigen::Vector3d::Constant(kUnknown);  ///< [T]
 };
 
 /// Layout of the bytes of an image; the values are the fourcc codes that V4L2 and LCM's bot_core use.
@@ -66,21 +71,21 @@ struct GpsMeasurement : Stamp {
   GpsFixType fix = GpsFixType::kNone;
   std::int32_t satellites = -1;
   TimeNs gps_time_ns = kNoTime;  ///< Since 1980-01-06 00:00:00 UTC, without leap seconds.
-  double latitude = 0;           ///< [rad], WGS 84
-  double longitude = 0;          ///< [rad]
-  double altitude = 0;           ///< [m] above the ellipsoid
-  Eigen::Matrix3d position_cov;  ///< [m^2], east, north, up
-  Eigen::Vector3d velocity_enu;  ///< [m/s], east, north, up
-  Eigen::Matrix3d velocity_cov;  ///< [m^2/s^2]
+  double latitude = kUnknown;    ///< [rad], WGS 84
+  double longitude = kUnknown;   ///< [rad]
+  double altitude = kUnknown;    ///< [m] above the ellipsoid
+  Eigen::Matrix3d position_cov = Eigen::Matrix3d::Constant(kUnknown);  ///< [m^2], east, north, up
+  Eigen::Vector3d velocity_enu = Eigen::Vector3d::Constant(kUnknown);  ///< [m/s], east, north, up
+  Eigen::Matrix3d velocity_cov = Eigen::Matrix3d::Constant(kUnknown);  ///< [m^2/s^2]
 };
 
 /// Pose by a reference system (motion capture, reference INS): truth for evaluation, never seen by an estimator under
 /// test. What the reference does not know is NaN.
 struct ReferenceMeasurement : Stamp {
-  Eigen::Quaterniond q_world_body;
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of body in world [m]
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< in world [m/s]
-  bool score = true;                                   ///< False where the recording says: do not score here.
+  Eigen::Quaterniond q_world_body{kUnknown, kUnknown, kUnknown, kUnknown};
+  Eigen::Vector3d position = Eigen::Vector3d::Constant(kUnknown);  ///< of body in world [m]
+  Eigen::Vector3d velocity = Eigen::Vector3d::Constant(kUnknown);  ///< in world [m/s]
+  bool score = true;  ///< False where the recording says: do not score here.
 };
 
 /// One sample of any stream.

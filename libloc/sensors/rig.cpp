@@ -29,6 +29,9 @@ void Rig::check() const {
             camera.name + ".intrinsics: must be finite, with positive focal lengths");
     require(camera.distortion.allFinite(), camera.name + ".distortion_coeffs: must be finite");
     require(camera.T_body_camera.translation.allFinite(), camera.name + ".T_cam_imu: must be finite");
+    // The comparison is false for NaN.
+    const double norm = camera.T_body_camera.rotation.norm();
+    require(std::abs(norm - 1) < 1e-6, camera.name + ".T_cam_imu: norm of its rotation", norm, "must be 1");
     require_finite(camera.name + ".timeshift_cam_imu", camera.time_offset_s);
     require_not_negative(camera.name + ".rate_hz", camera.rate_hz);
   }
