@@ -1,6 +1,7 @@
 #include "libloc/sensors/stream.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "libloc/core/check.hpp"
@@ -11,8 +12,15 @@ namespace {
 // Place among samples of one time.
 constexpr std::array<int, kStreamKinds> kRank = {4, 0, 1, 2, 3};
 
-int rank_of(StreamKind kind) {
-  return kRank[static_cast<std::size_t>(kind)];
+// a - b; far apart times give the largest difference there is instead of an overflow.
+TimeNs difference(TimeNs a, TimeNs b) {
+  TimeNs result = 0;
+  if (!__builtin_sub_overflow(a, b, &result)) return result;
+  return a > b ? std::numeric_limits<TimeNs>::max() : std::numeric_limits<TimeNs>::min();
+}
+
+TimeNs time_of(const Measurement& measurement) {
+  return stamp_of(measurement).time_ns;
 }
 
 }  // namespace
@@ -20,39 +28,90 @@ int rank_of(StreamKind kind) {
 StreamMerger::StreamMerger(StreamMergerOptions options) : options_(options) {
   require(options_.max_delay_ns >= 0, "max_delay_ns", static_cast<double>(options_.max_delay_ns),
           "must not be negative");
+  require(options_.max_jump_ns > 0, "max_jump_ns", static_cast<double>(options_.max_jump_ns), "must be positive");
   require(options_.max_samples > 0, "max_samples", 0, "must be positive");
   require(options_.reset_after > 0, "reset_after", options_.reset_after, "must be positive");
+  options_.max_jump_ns = std::max(options_.max_jump_ns, options_.max_delay_ns);
 }
 
-void StreamMerger::await(StreamKind kind) {
-  queues_[static_cast<std::size_t>(kind)].awaited = true;
+std::size_t StreamMerger::queue_of(StreamKind kind, int camera) {
+  if (kind != StreamKind::kImage || camera <= 0) return static_cast<std::size_t>(kind);
+  return kStreamKinds - 1 + std::min(static_cast<std::size_t>(camera), kCameraQueues - 1);
+}
+
+std::size_t StreamMerger::queue_of(const Measurement& measurement) {
+  const auto* image = std::get_if<ImageMeasurement>(&measurement);
+  return queue_of(kind_of(measurement), image == nullptr ? 0 : image->camera);
+}
+
+void StreamMerger::await(StreamKind kind, int camera) {
+  queues_[queue_of(kind, camera)].awaited = true;
 }
 
 void StreamMerger::push(Measurement measurement) {
-  const TimeNs time = stamp_of(measurement).time_ns;
+  const TimeNs time = time_of(measurement);
   require(time != kNoTime, "stream: a measurement without time");
-  const StreamKind kind = kind_of(measurement);
-  Queue& queue = queues_[static_cast<std::size_t>(kind)];
+  Queue& queue = queues_[queue_of(measurement)];
   queue.awaited = true;
-  if (last_out_ != kNoTime && std::pair(time, rank_of(kind)) < std::pair(last_out_, last_out_rank_)) {
+  const bool started = newest_ != kNoTime;
+  if (started && !finished_ && difference(time, newest_) > options_.max_jump_ns) {
+    // Time went on unless it comes back: what was set aside is believed as soon as another sample is there too.
+    accept_suspects_until(time);
+    if (difference(time, newest_) > options_.max_jump_ns) {
+      if (suspects_.size() == static_cast<std::size_t>(options_.reset_after)) drop_suspect(0);
+      suspects_.push_back({std::move(measurement)});
+      return;
+    }
+  } else if (started && (time < last_out_ || difference(newest_, time) > options_.max_jump_ns)) {
+    doubt_suspects();
     if (++queue.late_in_a_row < options_.reset_after) {
-      ++counts_.late[static_cast<std::size_t>(kind)];
+      ++counts_.late[measurement.index()];
       return;
     }
     start_anew();
+  } else {
+    doubt_suspects();
   }
   queue.late_in_a_row = 0;
+  accept(std::move(measurement));
+}
+
+void StreamMerger::accept(Measurement measurement) {
+  const TimeNs time = time_of(measurement);
+  Queue& queue = queues_[queue_of(measurement)];
   queue.newest = std::max(queue.newest, time);
   newest_ = std::max(newest_, time);
   // Nearly always at the end; equal times keep their order of arrival.
   auto place = queue.samples.end();
-  while (place != queue.samples.begin() && stamp_of(*std::prev(place)).time_ns > time) --place;
+  while (place != queue.samples.begin() && time_of(*std::prev(place)) > time) --place;
   queue.samples.insert(place, std::move(measurement));
   ++waiting_;
 }
 
+void StreamMerger::accept_suspects_until(TimeNs time) {
+  for (std::size_t i = 0; i < suspects_.size();) {
+    if (difference(time_of(suspects_[i].measurement), time) > options_.max_jump_ns) {
+      ++i;
+      continue;
+    }
+    accept(std::move(suspects_[i].measurement));
+    suspects_.erase(suspects_.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+}
+
+void StreamMerger::doubt_suspects() {
+  for (Suspect& suspect : suspects_) ++suspect.others;
+  while (!suspects_.empty() && suspects_.front().others >= options_.reset_after) drop_suspect(0);
+}
+
+void StreamMerger::drop_suspect(std::size_t index) {
+  ++counts_.absurd[suspects_[index].measurement.index()];
+  suspects_.erase(suspects_.begin() + static_cast<std::ptrdiff_t>(index));
+}
+
 void StreamMerger::start_anew() {
-  const bool was_finished = std::exchange(finished_, true);
+  const bool was_finished = finished_;
+  finish();
   // Through pop(), so that what was waiting keeps its order.
   std::deque<Measurement> rest;
   while (auto measurement = pop()) rest.push_back(std::move(*measurement));
@@ -77,36 +136,36 @@ std::optional<Measurement> StreamMerger::pop() {
   }
   Queue* first = nullptr;
   std::pair<TimeNs, int> first_key;
-  for (std::size_t i = 0; i < queues_.size(); ++i) {
-    if (queues_[i].samples.empty()) continue;
-    const std::pair key(stamp_of(queues_[i].samples.front()).time_ns, kRank[i]);
+  for (Queue& queue : queues_) {
+    if (queue.samples.empty()) continue;
+    const Measurement& front = queue.samples.front();
+    const std::pair key(time_of(front), kRank[front.index()]);
     if (first == nullptr || key < first_key) {
-      first = &queues_[i];
+      first = &queue;
       first_key = key;
     }
   }
   if (first == nullptr) return std::nullopt;
 
-  const bool forced = waiting_ > options_.max_samples;
-  // Differences of far apart times could overflow; a clock that jumped that far has waited long enough.
-  TimeNs age = 0;
-  const bool waited_out = __builtin_sub_overflow(newest_, first_key.first, &age) || age >= options_.max_delay_ns;
-  if (!finished_ && !forced && !waited_out) {
-    for (const Queue& queue : queues_) {
-      if (queue.awaited && (queue.newest == kNoTime || queue.newest < first_key.first)) return std::nullopt;
-    }
+  const TimeNs time = first_key.first;
+  const bool waited_out = options_.max_delay_ns == 0 || difference(newest_, time) > options_.max_delay_ns;
+  const auto passed = [time](const Queue& queue) {
+    return !queue.awaited || (queue.newest != kNoTime && queue.newest >= time);
+  };
+  if (!finished_ && !waited_out && !std::all_of(queues_.begin(), queues_.end(), passed)) {
+    if (waiting() <= options_.max_samples) return std::nullopt;
+    ++counts_.forced;
   }
-  if (forced) ++counts_.forced;
   Measurement out = std::move(first->samples.front());
   first->samples.pop_front();
   --waiting_;
-  last_out_ = first_key.first;
-  last_out_rank_ = first_key.second;
+  last_out_ = time;
   return out;
 }
 
 void StreamMerger::finish() {
   finished_ = true;
+  accept_suspects_until(std::numeric_limits<TimeNs>::max());
 }
 
 }  // namespace loc

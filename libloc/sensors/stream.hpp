@@ -1,9 +1,13 @@
 // Merges the samples of several streams into one sequence in time order, with a bounded delay: a sample leaves when
-// every stream that is awaited has passed its time, or when it has waited for max_delay of measurement time.
+// every stream that is awaited has passed its time, or when it has waited for more than max_delay of measurement time.
 // What comes too late for that (older than what has left already) is dropped and counted, never put out of order.
-// A clock that is set back shows as a run of late samples: after reset_after of them in one stream, all that waits
-// leaves and the sequence starts anew from there (counted; who feeds an estimator resets it then). As long as nothing
-// is later than max_delay, the result does not depend on the order of arrival: live and off line agree.
+// As long as each stream is in order, none is later than max_delay and all are awaited before their first sample, the
+// result does not depend on the order of arrival: live and off line agree.
+//
+// Clocks that jump. Set back: this shows as a run of late samples; after reset_after of them in one stream, all that
+// waits leaves and the sequence starts anew from there (counted; who feeds an estimator resets it then). Set forward, a
+// pause, or one absurd time: a sample further ahead than max_jump is set aside until another one shows that time really
+// went on (nothing is lost then); it is dropped and counted when reset_after samples arrive that know nothing of it.
 #pragma once
 
 #include <array>
@@ -17,14 +21,17 @@ namespace loc {
 
 struct StreamMergerOptions {
   TimeNs max_delay_ns = 50'000'000;  ///< Longest wait for another stream, in measurement time; 0 waits for nothing.
-  std::size_t max_samples = 4096;    ///< Bound on what waits; past it the oldest leaves at once.
-  int reset_after = 20;              ///< Late samples in a row, in one stream, that mean: the clock was set back.
+  /// A step of time beyond this needs a second sample to be believed; a longer max_delay takes its place.
+  TimeNs max_jump_ns = 10'000'000'000;
+  std::size_t max_samples = 4096;  ///< Bound on what waits; past it the oldest leaves at once.
+  int reset_after = 20;            ///< Late samples in a row, in one stream, that mean: the clock was set back.
 };
 
 struct StreamMergerCounts {
-  std::array<std::int64_t, kStreamKinds> late{};  ///< dropped: older than what had left
-  std::int64_t forced = 0;                        ///< left early, because max_samples waited
-  std::int64_t resets = 0;                        ///< times that the sequence started anew
+  std::array<std::int64_t, kStreamKinds> late{};    ///< dropped: older than what had left
+  std::array<std::int64_t, kStreamKinds> absurd{};  ///< dropped: alone with a time far ahead of all others
+  std::int64_t forced = 0;                          ///< left early, because max_samples waited
+  std::int64_t resets = 0;                          ///< times that the sequence started anew
 };
 
 class StreamMerger {
@@ -32,18 +39,19 @@ class StreamMerger {
   /// @throws std::invalid_argument when an option is out of range.
   explicit StreamMerger(StreamMergerOptions options = {});
 
-  /// Says that samples of this kind are to be waited for. A kind is awaited from its first sample on at the latest.
-  void await(StreamKind kind);
+  /// Says that samples of this kind (of this camera) are to be waited for. A stream is awaited from its first sample on
+  /// at the latest.
+  void await(StreamKind kind, int camera = 0);
   /// Takes a sample. It must have a time; @throws std::invalid_argument when it has none.
   void push(Measurement measurement);
-  /// The next sample in time order that may leave. At equal times: magnetometer, image, GPS, reference, IMU, so that an
-  /// IMU step finds what belongs to its time.
+  /// The next sample in time order that may leave. Of samples that wait with equal times: magnetometer, image (by
+  /// camera), GPS, reference, IMU, so that an IMU step finds what belongs to its time.
   std::optional<Measurement> pop();
   /// From here on pop() gives all that waits (end of the recording).
   void finish();
 
   const StreamMergerCounts& counts() const { return counts_; }
-  std::size_t waiting() const { return waiting_; }
+  std::size_t waiting() const { return waiting_ + suspects_.size(); }
 
  private:
   struct Queue {
@@ -52,16 +60,29 @@ class StreamMerger {
     bool awaited = false;
     int late_in_a_row = 0;
   };
+  // Cameras share times, so each has a queue of its own; those past the last share it.
+  static constexpr std::size_t kCameraQueues = 8;
+  static constexpr std::size_t kQueues = kStreamKinds + kCameraQueues - 1;
+  struct Suspect {
+    Measurement measurement;
+    int others = 0;  // samples since that know nothing of its time
+  };
 
+  static std::size_t queue_of(StreamKind kind, int camera);
+  static std::size_t queue_of(const Measurement& measurement);
+  void accept(Measurement measurement);
+  void accept_suspects_until(TimeNs time);
+  void doubt_suspects();
+  void drop_suspect(std::size_t index);
   void start_anew();
 
   StreamMergerOptions options_;
   std::deque<Measurement> before_reset_;  // in order, leaves first
-  std::array<Queue, kStreamKinds> queues_;
+  std::array<Queue, kQueues> queues_;
+  std::deque<Suspect> suspects_;  // far ahead, in order of arrival
   StreamMergerCounts counts_;
   std::size_t waiting_ = 0;
   TimeNs last_out_ = kNoTime;
-  int last_out_rank_ = 0;
   TimeNs newest_ = kNoTime;
   bool finished_ = false;
 };
