@@ -164,6 +164,12 @@ NamedCounts MeasurementDecoder::counts() const {
   return counts;
 }
 
+std::int64_t MeasurementDecoder::skipped() const {
+  std::int64_t sum = 0;
+  for (const auto& [name, value] : state_->skipped) sum += value;
+  return sum;
+}
+
 std::optional<GeodeticPoint> MeasurementDecoder::origin() const {
   return state_->reference.origin();
 }

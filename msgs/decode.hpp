@@ -70,6 +70,8 @@ class MeasurementDecoder {
 
   /// What was skipped without being wrong: {"imu.skipped.no_period", 1}, {"imu.skipped.other_channel", 12}.
   NamedCounts counts() const;
+  /// Sum of counts().
+  std::int64_t skipped() const;
 
   /// Where the world of the ASPN-23 reference has its origin; nullopt before the first position.
   std::optional<GeodeticPoint> origin() const;

@@ -1,0 +1,63 @@
+// Recordings of one's own as comma-separated text: the first line names the columns and their units, every other line
+// is one sample. Headings are written `name [unit]` or `name_unit`; case does not matter; a leading # is allowed.
+//
+//   what                  names                                                      units
+//   time                  time, timestamp, t, ts                                     ns, us, ms, s
+//   angular velocity      wx wy wz, gx gy gz, gyr_x.., gyro_x.., w_rs_s_x..          rad/s, deg/s (rad_s, deg_s, dps)
+//   specific force        ax ay az, acc_x.., a_rs_s_x..                              m/s^2, g, mg (m_s2, g, mg)
+//   magnetic field        mx my mz, mag_x..                                          T, mT, uT, nT, gauss, mgauss, arb
+//   reference orientation qw qx qy qz, q_rs_w.. (Hamilton, body to world)            none
+//   reference position    px py pz, p_rs_r_x..                                       m
+//   reference velocity    vx vy vz, v_rs_r_x..                                       m/s
+//   score                 score (0 or 1: compare with the reference here)            none
+//   not used              b_w_rs_s_x.., b_a_rs_s_x.. (EuRoC's reference biases)      any
+//
+// time_ns,wx_rad_s,... is the same as #timestamp [ns],wx [rad s^-1],...: this is EuRoC's own form, too. The unit [arb]
+// of a magnetic field is what the sensor counts in; CsvOptions tells how many tesla that is. Columns come in any order
+// and number; a time and one complete triad are needed. The cells of one triad may all be empty (a magnetometer at its
+// own rate), never some of them. Comments: only the first line may begin with #.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+
+#include "libloc/estimators/estimate.hpp"
+#include "libloc/io/source.hpp"
+
+namespace loc {
+
+/// Units of columns whose heading has none; written as in the table above. Empty: such a column is an error.
+struct CsvOptions {
+  std::string time_unit;
+  std::string angular_velocity_unit;
+  std::string specific_force_unit;
+  std::string magnetic_field_unit;
+  double tesla_per_unit = 0;  ///< [T], for the unit arb; 0: arb is an error.
+};
+
+/// A recording in one file. Skipped and counted, as told in euroc.hpp: rows whose time is not after the one before, a
+/// last line without its line end; counted: values that are not finite.
+/// @throws DataError naming file, line, column and value: here for the heading, from next() for a row.
+std::unique_ptr<MeasurementSource> open_csv(const std::filesystem::path& path, const CsvOptions& options = {});
+
+/// Writes estimates, one line each: time_ns, quaternion w x y z, position [m], velocity [m/s], angular velocity
+/// [rad/s], biases [rad/s, m/s^2], the deviations of the 15 errors (theta [rad], position, velocity, biases), the bits
+/// valid and status, sequence. What an estimate does not hold is left empty. Numbers are written so that reading gives
+/// the same double.
+class CsvWriter {
+ public:
+  /// @throws DataError when the file cannot be written.
+  explicit CsvWriter(const std::filesystem::path& path);
+  void write(const Estimate& estimate);
+  /// Everything is on its way to the disk; @throws DataError when it is not (disk full).
+  void flush();
+
+ private:
+  std::filesystem::path path_;
+  std::ofstream file_;
+};
+
+}  // namespace loc

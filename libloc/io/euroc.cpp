@@ -1,0 +1,108 @@
+#include "libloc/io/euroc.hpp"
+
+#include <array>
+#include <optional>
+
+#include "libloc/core/check.hpp"
+#include "libloc/io/table.hpp"
+
+namespace loc {
+namespace {
+
+namespace fs = std::filesystem;
+
+// One file of the recording, one sample ahead.
+class Stream {
+ public:
+  Stream(const fs::path& path, StreamKind kind, const CsvOptions& options)
+      : table_(path, options, stream_name(kind)), kind_(kind) {
+    const io::Quantity needed = kind == StreamKind::kImu            ? io::Quantity::kAngularVelocity
+                                : kind == StreamKind::kMagnetometer ? io::Quantity::kMagneticField
+                                                                    : io::Quantity::kOrientation;
+    if (!table_.has(needed)) throw DataError(path.string() + ": no columns of " + stream_name(kind));
+  }
+
+  // Read when it is asked for, so that a bad row does not take the good one before it along.
+  const std::optional<Measurement>& head() {
+    if (!loaded_) advance();
+    loaded_ = true;
+    return head_;
+  }
+  Measurement take() {
+    loaded_ = false;
+    return std::move(*head_);
+  }
+  void add_counts(NamedCounts& counts) const { table_.add_counts(counts); }
+
+ private:
+  void advance() {
+    head_.reset();
+    if (const auto row = table_.next()) {
+      if (kind_ == StreamKind::kImu && row->imu) {
+        head_ = *row->imu;
+      } else if (kind_ == StreamKind::kMagnetometer && row->magnetometer) {
+        head_ = *row->magnetometer;
+      } else if (kind_ == StreamKind::kReference && row->reference) {
+        head_ = *row->reference;
+      } else {
+        throw DataError(table_.where() + ": empty cells");
+      }
+      stamp_of(*head_).sequence = sequence_++;
+    }
+  }
+
+  io::Table table_;
+  StreamKind kind_;
+  std::optional<Measurement> head_;
+  bool loaded_ = false;
+  std::int64_t sequence_ = 0;
+};
+
+class EurocSource final : public MeasurementSource {
+ public:
+  EurocSource(const fs::path& folder, const EurocOptions& options) {
+    fs::path mav = folder;
+    if (fs::is_directory(folder / "mav0")) mav = folder / "mav0";
+    if (!fs::is_directory(mav)) throw DataError(folder.string() + ": no such folder");
+    const fs::path imu = mav / "imu0" / "data.csv";
+    if (!fs::exists(imu)) throw DataError(imu.string() + ": no such file; an EuRoC recording has it in mav0/imu0");
+
+    // In the order of equal times. EuRoC counts nanoseconds throughout, though not every heading says so.
+    CsvOptions csv;
+    csv.time_unit = "ns";
+    const fs::path field = mav / "mag0" / "data.csv";
+    if (options.read_magnetometer && fs::exists(field)) streams_[0].emplace(field, StreamKind::kMagnetometer, csv);
+    const fs::path reference = mav / "state_groundtruth_estimate0" / "data.csv";
+    if (options.read_reference && fs::exists(reference)) streams_[1].emplace(reference, StreamKind::kReference, csv);
+    streams_[2].emplace(imu, StreamKind::kImu, csv);
+  }
+
+  std::optional<Measurement> next() override {
+    Stream* first = nullptr;
+    for (auto& stream : streams_) {
+      if (!stream || !stream->head()) continue;
+      if (first == nullptr || stamp_of(*stream->head()).time_ns < stamp_of(*first->head()).time_ns) first = &*stream;
+    }
+    if (first == nullptr) return std::nullopt;
+    return first->take();
+  }
+
+  NamedCounts counts() const override {
+    NamedCounts counts;
+    for (const auto& stream : streams_) {
+      if (stream) stream->add_counts(counts);
+    }
+    return counts;
+  }
+
+ private:
+  std::array<std::optional<Stream>, 3> streams_;
+};
+
+}  // namespace
+
+std::unique_ptr<MeasurementSource> open_euroc(const fs::path& folder, const EurocOptions& options) {
+  return std::make_unique<EurocSource>(folder, options);
+}
+
+}  // namespace loc

@@ -1,0 +1,29 @@
+// EuRoC / ASL recordings: a folder mav0 with imu0/data.csv, and where they are there
+// state_groundtruth_estimate0/data.csv (or its relative of the same columns) as reference and mag0/data.csv. The units
+// in the heading lines are checked. Pictures (cam0, cam1) are not read here.
+// Frames: body = imu0; world as the reference system has it, z up. Source: Burri et al., "The EuRoC micro aerial
+// vehicle datasets", 2016.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "libloc/io/source.hpp"
+
+namespace loc {
+
+struct EurocOptions {
+  bool read_reference = true;     ///< False: as if there were none.
+  bool read_magnetometer = true;  ///< False: as if there were none.
+};
+
+/// A recording: IMU, magnetometer and reference merged in time order; at equal times magnetometer, reference, IMU.
+/// Rows whose time is not after the row's before are skipped and counted ("imu.skipped.time_not_increasing"), and so is
+/// a last line without its line end, which may have been cut ("imu.skipped.no_line_end"). NaN and infinity in a
+/// measurement pass and are counted ("imu.not_finite"). A reference quaternion is normalised.
+/// @param folder the one that holds mav0, or mav0 itself
+/// @throws DataError naming file, line and column, here for a missing or empty imu0 and wrong headings, and from next()
+/// for a row that cannot be read.
+std::unique_ptr<MeasurementSource> open_euroc(const std::filesystem::path& folder, const EurocOptions& options = {});
+
+}  // namespace loc

@@ -1,0 +1,210 @@
+#include "libloc/io/rig_yaml.hpp"
+
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+
+#include "libloc/io/text_file.hpp"
+#include "libloc/io/yaml_block.hpp"
+
+namespace loc {
+namespace {
+
+using io::YamlBlock;
+
+constexpr const char* kFormat = "libloc-rig-1";
+constexpr double kUnitTolerance = 1e-9;
+
+const char* name_of(DistortionModel model) {
+  switch (model) {
+    case DistortionModel::kNone:
+      return "none";
+    case DistortionModel::kRadtan:
+      return "radtan";
+    case DistortionModel::kEquidistant:
+      return "equidistant";
+  }
+  return "none";
+}
+
+TriadCalibration read_triad(YamlBlock block) {
+  TriadCalibration triad;
+  triad.bias = block.vector3("bias");
+  triad.matrix = block.matrix("matrix", 3, 3);
+  block.finish();
+  return triad;
+}
+
+ImuCalibration read_imu(YamlBlock block) {
+  ImuCalibration imu;
+  imu.rate_hz = block.number("rate_hz");
+  YamlBlock noise = block.block("noise");
+  imu.noise.gyroscope_noise_density = noise.number("gyroscope_noise_density");
+  imu.noise.gyroscope_random_walk = noise.number("gyroscope_random_walk");
+  imu.noise.accelerometer_noise_density = noise.number("accelerometer_noise_density");
+  imu.noise.accelerometer_random_walk = noise.number("accelerometer_random_walk");
+  imu.noise.gyroscope_bias_sigma = noise.number("gyroscope_bias_sigma");
+  imu.noise.accelerometer_bias_sigma = noise.number("accelerometer_bias_sigma");
+  noise.finish();
+  imu.gyroscope = read_triad(block.block("gyroscope"));
+  imu.accelerometer = read_triad(block.block("accelerometer"));
+  block.finish();
+  return imu;
+}
+
+Pose3 read_pose(YamlBlock block) {
+  Pose3 pose;
+  pose.translation = block.vector3("translation");
+  const std::vector<double> q = block.numbers("q_wxyz", 4);
+  pose.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
+  const double off = std::abs(pose.rotation.norm() - 1);
+  if (off > 1e-2) block.fail("q_wxyz", "must have norm 1, not " + std::to_string(pose.rotation.norm()));
+  // What a program wrote is kept to the last bit.
+  if (off > kUnitTolerance) pose.rotation.normalize();
+  block.finish();
+  return pose;
+}
+
+std::int32_t read_pixels(YamlBlock& block, const char* key, double value) {
+  if (value != std::floor(value) || value < 1 || value > 1e6) block.fail(key, "must be whole, positive numbers");
+  return static_cast<std::int32_t>(value);
+}
+
+DistortionModel read_model(YamlBlock& block, const char* key) {
+  const std::string name = block.text(key);
+  for (const auto model : {DistortionModel::kNone, DistortionModel::kRadtan, DistortionModel::kEquidistant}) {
+    if (name == name_of(model)) return model;
+  }
+  block.fail(key, "= '" + name + "' is not none, radtan or equidistant");
+}
+
+CameraCalibration read_camera(YamlBlock block) {
+  CameraCalibration camera;
+  camera.name = block.text("name");
+  const std::vector<double> resolution = block.numbers("resolution", 2);
+  camera.width_px = read_pixels(block, "resolution", resolution[0]);
+  camera.height_px = read_pixels(block, "resolution", resolution[1]);
+  camera.intrinsics_px = Eigen::Map<const Eigen::Vector4d>(block.numbers("intrinsics", 4).data());
+  camera.distortion_model = read_model(block, "distortion_model");
+  camera.distortion = Eigen::Map<const Eigen::Vector4d>(block.numbers("distortion_coeffs", 4).data());
+  camera.T_body_camera = read_pose(block.block("T_body_camera"));
+  camera.time_offset_s = block.number("time_offset_s");
+  camera.rate_hz = block.number("rate_hz");
+  block.finish();
+  return camera;
+}
+
+// Numbers are handed over as text: the emitter would round them.
+template <class Vector>
+void emit_list(YAML::Emitter& out, const Vector& values) {
+  out << YAML::Flow << YAML::BeginSeq;
+  for (const double value : values) {
+    std::string text;
+    io::append_number(text, value);
+    out << text;
+  }
+  out << YAML::EndSeq;
+}
+
+void emit_number(YAML::Emitter& out, const char* key, double value) {
+  std::string text;
+  io::append_number(text, value);
+  out << YAML::Key << key << YAML::Value << text;
+}
+
+void emit_triad(YAML::Emitter& out, const TriadCalibration& triad) {
+  out << YAML::BeginMap << YAML::Key << "bias" << YAML::Value;
+  emit_list(out, triad.bias);
+  out << YAML::Key << "matrix" << YAML::Value << YAML::Flow << YAML::BeginSeq;
+  for (int i = 0; i < 3; ++i) emit_list(out, Eigen::Vector3d(triad.matrix.row(i)));
+  out << YAML::EndSeq << YAML::EndMap;
+}
+
+void emit_imu(YAML::Emitter& out, const ImuCalibration& imu) {
+  out << YAML::Key << "imu" << YAML::Value << YAML::BeginMap;
+  emit_number(out, "rate_hz", imu.rate_hz);
+  out << YAML::Key << "noise" << YAML::Value << YAML::BeginMap;
+  emit_number(out, "gyroscope_noise_density", imu.noise.gyroscope_noise_density);
+  emit_number(out, "gyroscope_random_walk", imu.noise.gyroscope_random_walk);
+  emit_number(out, "accelerometer_noise_density", imu.noise.accelerometer_noise_density);
+  emit_number(out, "accelerometer_random_walk", imu.noise.accelerometer_random_walk);
+  emit_number(out, "gyroscope_bias_sigma", imu.noise.gyroscope_bias_sigma);
+  emit_number(out, "accelerometer_bias_sigma", imu.noise.accelerometer_bias_sigma);
+  out << YAML::EndMap << YAML::Key << "gyroscope" << YAML::Value;
+  emit_triad(out, imu.gyroscope);
+  out << YAML::Key << "accelerometer" << YAML::Value;
+  emit_triad(out, imu.accelerometer);
+  out << YAML::EndMap;
+}
+
+void emit_camera(YAML::Emitter& out, const CameraCalibration& camera) {
+  const Eigen::Quaterniond& q = camera.T_body_camera.rotation;
+  require(std::abs(q.norm() - 1) <= kUnitTolerance, camera.name + ".T_body_camera: norm of the quaternion", q.norm(),
+          "must be 1");
+  require(!camera.name.empty(), "a camera must have a name");
+  out << YAML::BeginMap;
+  out << YAML::Key << "name" << YAML::Value << YAML::DoubleQuoted << camera.name;
+  out << YAML::Key << "resolution" << YAML::Value << YAML::Flow << YAML::BeginSeq << camera.width_px << camera.height_px
+      << YAML::EndSeq;
+  out << YAML::Key << "intrinsics" << YAML::Value;
+  emit_list(out, camera.intrinsics_px);
+  out << YAML::Key << "distortion_model" << YAML::Value << name_of(camera.distortion_model);
+  out << YAML::Key << "distortion_coeffs" << YAML::Value;
+  emit_list(out, camera.distortion);
+  out << YAML::Key << "T_body_camera" << YAML::Value << YAML::BeginMap << YAML::Key << "translation" << YAML::Value;
+  emit_list(out, camera.T_body_camera.translation);
+  out << YAML::Key << "q_wxyz" << YAML::Value;
+  emit_list(out, Eigen::Vector4d(q.w(), q.x(), q.y(), q.z()));
+  out << YAML::EndMap;
+  emit_number(out, "time_offset_s", camera.time_offset_s);
+  emit_number(out, "rate_hz", camera.rate_hz);
+  out << YAML::EndMap;
+}
+
+}  // namespace
+
+Rig read_rig(const std::filesystem::path& path) {
+  YamlBlock file = YamlBlock::load(path, true);
+  if (file.text("format") != kFormat) file.fail("format", std::string("must be ") + kFormat);
+  Rig rig;
+  if (file.has("imu")) rig.imu = read_imu(file.block("imu"));
+  if (file.has("magnetometer")) rig.magnetometer = MagnetometerCalibration{read_triad(file.block("magnetometer"))};
+  if (file.has("cameras")) {
+    for (YamlBlock& block : file.blocks("cameras")) rig.cameras.push_back(read_camera(std::move(block)));
+  }
+  if (file.has("gps")) {
+    YamlBlock gps = file.block("gps");
+    rig.gps = GpsCalibration{gps.vector3("antenna_in_body")};
+    gps.finish();
+  }
+  file.finish();
+  io::as_data_error(path, [&] { rig.check(); });
+  return rig;
+}
+
+void write_rig(const std::filesystem::path& path, const Rig& rig) {
+  rig.check();
+  YAML::Emitter out;
+  out << YAML::BeginMap << YAML::Key << "format" << YAML::Value << kFormat;
+  if (rig.imu) emit_imu(out, *rig.imu);
+  if (rig.magnetometer) {
+    out << YAML::Key << "magnetometer" << YAML::Value;
+    emit_triad(out, rig.magnetometer->triad);
+  }
+  if (!rig.cameras.empty()) {
+    out << YAML::Key << "cameras" << YAML::Value << YAML::BeginSeq;
+    for (const CameraCalibration& camera : rig.cameras) emit_camera(out, camera);
+    out << YAML::EndSeq;
+  }
+  if (rig.gps) {
+    out << YAML::Key << "gps" << YAML::Value << YAML::BeginMap << YAML::Key << "antenna_in_body" << YAML::Value;
+    emit_list(out, rig.gps->antenna_in_body);
+    out << YAML::EndMap;
+  }
+  out << YAML::EndMap;
+  io::AtomicFile file(path);
+  file.stream() << out.c_str() << "\n...\n";
+  file.commit();
+}
+
+}  // namespace loc

@@ -1,0 +1,168 @@
+#include "libloc/io/table.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "libloc/core/check.hpp"
+
+namespace loc::io {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+enum : std::size_t { kMagnetometerRow = 0, kReferenceRow = 1, kImuRow = 2 };
+constexpr std::array<const char*, 3> kRowNames{"magnetometer", "reference", "imu"};
+
+}  // namespace
+
+Table::Table(const std::filesystem::path& path, const CsvOptions& options, std::string label)
+    : lines_(path), label_(std::move(label)) {
+  const auto heading = lines_.next();
+  if (!heading) throw DataError(path.string() + ": the heading line has no end");
+  columns_ = parse_heading(*heading, lines_.where(), options);
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    at_[static_cast<std::size_t>(columns_[i].quantity)][columns_[i].axis] = i;
+  }
+  ahead_ = read_row();
+  if (!ahead_) throw DataError(path.string() + ": no complete row under the heading");
+}
+
+bool Table::has(Quantity quantity) const {
+  return at_[static_cast<std::size_t>(quantity)][0].has_value();
+}
+
+std::optional<Row> Table::next() {
+  std::optional<Row> row = std::move(ahead_);
+  ahead_.reset();
+  if (!row) row = read_row();
+  if (row) {
+    const std::array<bool, 3> present{row->magnetometer.has_value(), row->reference.has_value(), row->imu.has_value()};
+    for (std::size_t i = 0; i < present.size(); ++i) {
+      if (present[i]) ++read_[i];
+    }
+    if (row->magnetometer && !row->magnetometer->magnetic_field.allFinite()) ++not_finite_[kMagnetometerRow];
+    if (row->imu && !(row->imu->angular_velocity.allFinite() && row->imu->specific_force.allFinite())) {
+      ++not_finite_[kImuRow];
+    }
+    if (row->reference && ((has(Quantity::kOrientation) && !row->reference->q_world_body.coeffs().allFinite()) ||
+                           (has(Quantity::kPosition) && !row->reference->position.allFinite()))) {
+      ++not_finite_[kReferenceRow];
+    }
+  }
+  return row;
+}
+
+std::optional<Row> Table::read_row() {
+  while (const auto line = lines_.next()) {
+    if (trim(*line).empty()) {
+      ++blank_;
+      continue;
+    }
+    split_cells(*line, cells_);
+    if (cells_.size() != columns_.size()) {
+      throw DataError(lines_.where() + ": " + std::to_string(cells_.size()) + " cells where the heading has " +
+                      std::to_string(columns_.size()));
+    }
+    const std::size_t time_cell = *at_[static_cast<std::size_t>(Quantity::kTime)][0];
+    const Column& time_column = columns_[time_cell];
+    const auto time_ns = parse_time(cells_[time_cell], time_column.time_exponent);
+    if (!time_ns) {
+      throw DataError(lines_.where() + ": column '" + time_column.heading + "': '" + std::string(cells_[time_cell]) +
+                      "' is not a time");
+    }
+    // All of the row is read even when it is skipped then: damage must show.
+    Row row = convert(*time_ns);
+    if (last_time_ns_ != kNoTime && *time_ns <= last_time_ns_) {
+      ++not_increasing_;
+      continue;
+    }
+    last_time_ns_ = *time_ns;
+    return row;
+  }
+  return std::nullopt;
+}
+
+// True when the cells hold the quantity, false when all are empty (or there is no such column).
+bool Table::take(Quantity quantity, double* values) const {
+  if (!has(quantity)) return false;
+  std::size_t empty = 0;
+  const std::size_t axes = axes_of(quantity);
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    const std::size_t cell = *at_[static_cast<std::size_t>(quantity)][axis];
+    if (cells_[cell].empty()) {
+      ++empty;
+      continue;
+    }
+    const auto value = parse_number(cells_[cell]);
+    if (!value) {
+      throw DataError(lines_.where() + ": column '" + columns_[cell].heading + "': '" + std::string(cells_[cell]) +
+                      "' is not a number");
+    }
+    values[axis] = *value * columns_[cell].to_si;
+  }
+  if (empty != 0 && empty != axes) {
+    const std::size_t cell = *at_[static_cast<std::size_t>(quantity)][0];
+    throw DataError(lines_.where() + ": column '" + columns_[cell].heading + "' and its fellows: some cells are empty");
+  }
+  return empty == 0;
+}
+
+Row Table::convert(TimeNs time_ns) {
+  Row row;
+  Eigen::Vector3d a;
+  Eigen::Vector3d b;
+  const bool has_rate = take(Quantity::kAngularVelocity, a.data());
+  const bool has_force = take(Quantity::kSpecificForce, b.data());
+  if (has_rate != has_force) {
+    throw DataError(lines_.where() + ": angular velocity and specific force: one is empty, the other is not");
+  }
+  if (has_rate) {
+    row.imu.emplace();
+    row.imu->time_ns = time_ns;
+    row.imu->angular_velocity = a;
+    row.imu->specific_force = b;
+  }
+  if (take(Quantity::kMagneticField, a.data())) {
+    row.magnetometer.emplace();
+    row.magnetometer->time_ns = time_ns;
+    row.magnetometer->magnetic_field = a;
+  }
+
+  ReferenceMeasurement reference;
+  reference.time_ns = time_ns;
+  reference.q_world_body = Eigen::Quaterniond(kNan, kNan, kNan, kNan);
+  reference.position.setConstant(kNan);
+  reference.velocity.setConstant(kNan);
+  std::array<double, 4> wxyz{};
+  double score = 1;
+  bool any = false;
+  if (take(Quantity::kOrientation, wxyz.data())) {
+    any = true;
+    const Eigen::Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+    if (std::abs(q.norm() - 1) > 1e-2) {  // false for NaN, which passes
+      throw DataError(lines_.where() + ": reference quaternion with norm " + std::to_string(q.norm()) + ": must be 1");
+    }
+    if (std::isfinite(q.norm())) reference.q_world_body = q.normalized();
+  }
+  any = take(Quantity::kPosition, reference.position.data()) || any;
+  any = take(Quantity::kVelocity, reference.velocity.data()) || any;
+  if (take(Quantity::kScore, &score)) {
+    if (score != 0 && score != 1) {
+      throw DataError(lines_.where() + ": score = " + std::to_string(score) + ": must be 0 or 1");
+    }
+    reference.score = score == 1;
+  }
+  if (any) row.reference = reference;
+  return row;
+}
+
+void Table::add_counts(NamedCounts& counts) const {
+  for (std::size_t i = 0; i < read_.size(); ++i) {
+    if (read_[i] > 0) counts.push_back({std::string(kRowNames[i]) + ".read", read_[i]});
+    if (not_finite_[i] > 0) counts.push_back({std::string(kRowNames[i]) + ".not_finite", not_finite_[i]});
+  }
+  if (not_increasing_ > 0) counts.push_back({label_ + ".skipped.time_not_increasing", not_increasing_});
+  if (blank_ > 0) counts.push_back({label_ + ".skipped.blank", blank_});
+  if (lines_.cut_tail()) counts.push_back({label_ + ".skipped.no_line_end", 1});
+}
+
+}  // namespace loc::io

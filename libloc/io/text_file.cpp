@@ -1,0 +1,125 @@
+#include "libloc/io/text_file.hpp"
+
+#include <unistd.h>
+
+#include <charconv>
+#include <stdexcept>
+#include <system_error>
+
+namespace loc::io {
+namespace {
+
+constexpr std::size_t kLongestLine = 64 * 1024;
+
+}  // namespace
+
+LineReader::LineReader(std::filesystem::path path) : path_(std::move(path)), buffer_(kLongestLine) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path_, error);
+  if (!std::filesystem::exists(status)) throw DataError(path_.string() + ": no such file");
+  if (std::filesystem::is_directory(status)) throw DataError(path_.string() + ": is a folder, not a file");
+  file_.open(path_, std::ios::binary);
+  if (!file_) throw DataError(path_.string() + ": cannot be opened");
+  if (file_.peek() == std::ifstream::traits_type::eof()) throw DataError(path_.string() + ": the file is empty");
+}
+
+std::optional<std::string_view> LineReader::next() {
+  if (cut_tail_ || !file_.good()) return std::nullopt;
+  file_.getline(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
+  auto length = static_cast<std::size_t>(file_.gcount());
+  ++line_;
+  if (file_.bad()) throw DataError(where() + ": reading failed");
+  if (file_.eof()) {
+    cut_tail_ = length > 0;
+    return std::nullopt;
+  }
+  if (file_.fail()) throw DataError(where() + ": longer than " + std::to_string(kLongestLine) + " bytes");
+  --length;  // the line end was taken too
+  std::string_view line(buffer_.data(), length);
+  if (line_ == 1 && line.starts_with("\xEF\xBB\xBF")) line.remove_prefix(3);
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  return line;
+}
+
+std::string_view trim(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
+}
+
+void split_cells(std::string_view line, std::vector<std::string_view>& cells) {
+  cells.clear();
+  for (;;) {
+    const auto comma = line.find(',');
+    cells.push_back(trim(line.substr(0, comma)));
+    if (comma == std::string_view::npos) return;
+    line.remove_prefix(comma + 1);
+  }
+}
+
+std::optional<double> parse_number(std::string_view text) {
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+std::optional<std::int64_t> parse_integer(std::string_view text) {
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+std::optional<TimeNs> parse_time(std::string_view text, int exponent) {
+  if (exponent == -9) {
+    if (const auto ns = parse_integer(text)) return *ns == kNoTime ? std::nullopt : ns;
+  }
+  // The decimal exponent is moved instead of the value being multiplied: stays exact.
+  std::string_view mantissa = text;
+  std::int64_t own_exponent = 0;
+  if (const auto e = text.find_first_of("eE"); e != std::string_view::npos) {
+    std::string_view digits = text.substr(e + 1);
+    if (digits.starts_with('+')) digits.remove_prefix(1);
+    const auto value = parse_integer(digits);
+    if (!value || *value < -30 || *value > 30) return std::nullopt;
+    own_exponent = *value;
+    mantissa = text.substr(0, e);
+  }
+  try {
+    return parse_seconds(std::string(mantissa) + "e" + std::to_string(own_exponent + exponent));
+  } catch (const std::invalid_argument&) {
+    return std::nullopt;
+  }
+}
+
+void append_number(std::string& text, double value) {
+  std::array<char, 32> buffer{};
+  const auto [end, error] = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
+  text.append(buffer.data(), end);
+}
+
+AtomicFile::AtomicFile(std::filesystem::path path)
+    : path_(std::move(path)), temporary_(path_.string() + "." + std::to_string(::getpid()) + ".tmp") {
+  file_.open(temporary_, std::ios::binary | std::ios::trunc);
+  if (!file_) throw DataError(path_.string() + ": cannot be written");
+}
+
+AtomicFile::~AtomicFile() {
+  if (committed_) return;
+  file_.close();
+  std::error_code ignored;
+  std::filesystem::remove(temporary_, ignored);
+}
+
+void AtomicFile::commit() {
+  file_.close();
+  if (!file_) throw DataError(path_.string() + ": not everything could be written");
+  std::error_code error;
+  std::filesystem::rename(temporary_, path_, error);
+  if (error) throw DataError(path_.string() + ": " + error.message());
+  committed_ = true;
+}
+
+}  // namespace loc::io

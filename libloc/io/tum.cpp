@@ -1,0 +1,91 @@
+#include "libloc/io/tum.hpp"
+
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "libloc/core/check.hpp"
+#include "libloc/io/text_file.hpp"
+
+namespace loc {
+namespace {
+
+// The next word between blanks, taken off the front of rest.
+std::string_view next_word(std::string_view& rest) {
+  rest = io::trim(rest);
+  const auto end = std::min(rest.find_first_of(" \t"), rest.size());
+  const std::string_view word = rest.substr(0, end);
+  rest.remove_prefix(end);
+  return word;
+}
+
+StampedPose parse_pose(std::string_view line, const std::string& where) {
+  static constexpr std::array<const char*, 7> kNames{"tx", "ty", "tz", "qx", "qy", "qz", "qw"};
+  std::string_view rest = line;
+  StampedPose pose;
+  const std::string_view time = next_word(rest);
+  const auto time_ns = io::parse_time(time, 0);
+  if (!time_ns) throw DataError(where + ": '" + std::string(time) + "' is not a time in seconds");
+  pose.time_ns = *time_ns;
+  std::array<double, 7> values{};
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::string_view word = next_word(rest);
+    if (word.empty()) throw DataError(where + ": " + kNames[i] + " is missing; a pose has 8 columns");
+    const auto value = io::parse_number(word);
+    if (!value || !std::isfinite(*value)) {
+      throw DataError(where + ": " + kNames[i] + " = '" + std::string(word) + "' is not a finite number");
+    }
+    values[i] = *value;
+  }
+  if (!io::trim(rest).empty()) throw DataError(where + ": more than 8 columns");
+  pose.T_world_body.translation = {values[0], values[1], values[2]};
+  const Eigen::Quaterniond q(values[6], values[3], values[4], values[5]);
+  if (!(std::abs(q.norm() - 1) <= 1e-2)) {
+    throw DataError(where + ": quaternion with norm " + std::to_string(q.norm()) + ": must be 1");
+  }
+  pose.T_world_body.rotation = q.normalized();
+  return pose;
+}
+
+}  // namespace
+
+TumTrajectory read_tum(const std::filesystem::path& path) {
+  io::LineReader lines(path);
+  TumTrajectory trajectory;
+  std::int64_t not_increasing = 0;
+  while (const auto line = lines.next()) {
+    const std::string_view text = io::trim(*line);
+    if (text.empty() || text.starts_with('#')) continue;
+    const StampedPose pose = parse_pose(text, lines.where());
+    if (!trajectory.poses.empty() && pose.time_ns <= trajectory.poses.back().time_ns) {
+      ++not_increasing;
+      continue;
+    }
+    trajectory.poses.push_back(pose);
+  }
+  if (trajectory.poses.empty()) throw DataError(path.string() + ": no complete pose in it");
+  trajectory.counts.push_back({"tum.read", static_cast<std::int64_t>(trajectory.poses.size())});
+  if (not_increasing > 0) trajectory.counts.push_back({"tum.skipped.time_not_increasing", not_increasing});
+  if (lines.cut_tail()) trajectory.counts.push_back({"tum.skipped.no_line_end", 1});
+  return trajectory;
+}
+
+void write_tum(const std::filesystem::path& path, const std::vector<StampedPose>& poses) {
+  io::AtomicFile file(path);
+  file.stream() << "# timestamp [s] tx ty tz [m] qx qy qz qw, body to world\n";
+  for (const StampedPose& pose : poses) {
+    const Eigen::Vector3d& t = pose.T_world_body.translation;
+    const Eigen::Quaterniond& q = pose.T_world_body.rotation;
+    require(pose.time_ns != kNoTime && t.allFinite() && q.coeffs().allFinite(),
+            "a pose at " + format_seconds(pose.time_ns) + " s is not finite or has no time");
+    std::string line = format_seconds(pose.time_ns);
+    for (const double value : {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()}) {
+      line += ' ';
+      io::append_number(line, value);
+    }
+    file.stream() << line << '\n';
+  }
+  file.commit();
+}
+
+}  // namespace loc
