@@ -1,0 +1,268 @@
+// The message types: fingerprints are frozen, conversions lose nothing, wrong bytes are refused.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <limits>
+
+#include "libloc/core/check.hpp"
+#include "libloc/core/random.hpp"
+#include "loc/map_points_t.hpp"
+#include "loc/source_status_t.hpp"
+#include "loc/statistics_t.hpp"
+#include "loc/tracks_t.hpp"
+#include "msgs/convert.hpp"
+
+namespace loc {
+namespace {
+
+// Published types are frozen: recordings that exist must stay readable. A change of fields is a new type (imu2_t).
+TEST(Messages, FingerprintsAreFrozen) {
+  const auto hash = [](std::int64_t value) { return static_cast<std::uint64_t>(value); };
+  EXPECT_EQ(hash(imu_t::getHash()), 0x6e15af9aa7f2f0bdU);
+  EXPECT_EQ(hash(magnetometer_t::getHash()), 0x939b1e83f8a696d2U);
+  EXPECT_EQ(hash(image_t::getHash()), 0xca5a4d4cb4b858c2U);
+  EXPECT_EQ(hash(gps_fix_t::getHash()), 0x64d7e0398f38fe74U);
+  EXPECT_EQ(hash(reference_t::getHash()), 0x120581a61696ae36U);
+  EXPECT_EQ(hash(estimate_t::getHash()), 0xa4e5476eef3b739bU);
+  EXPECT_EQ(hash(tracks_t::getHash()), 0x950a197598a1b7d6U);
+  EXPECT_EQ(hash(map_points_t::getHash()), 0xcff528ac74639d5fU);
+  EXPECT_EQ(hash(statistics_t::getHash()), 0x2f2b80d43dc8bfd9U);
+  EXPECT_EQ(hash(source_status_t::getHash()), 0xd63ab9362bc56f14U);
+}
+
+template <class T>
+std::vector<std::uint8_t> encoded(const T& message) {
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
+  EXPECT_EQ(message.encode(bytes.data(), 0, static_cast<int>(bytes.size())), static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+/// Measurement to message to bytes to message: what arrives at the other end.
+template <class T>
+T over_the_wire(const T& message) {
+  const std::vector<std::uint8_t> bytes = encoded(message);
+  T out{};
+  EXPECT_EQ(out.decode(bytes.data(), 0, static_cast<int>(bytes.size())), static_cast<int>(bytes.size()));
+  return out;
+}
+
+void fill_stamp(Random& random, Stamp& stamp) {
+  stamp.time_ns = static_cast<TimeNs>(random.uniform(-4e18, 4e18));
+  stamp.host_time_ns = static_cast<TimeNs>(random.uniform(-4e18, 4e18));
+  stamp.sequence = static_cast<std::int64_t>(random.uniform(0, 1e15));
+}
+
+Eigen::Vector3d any_vector(Random& random) {
+  return {random.uniform(-1e3, 1e3), random.uniform(-1e-9, 1e-9), random.uniform(-1e300, 1e300)};
+}
+
+Eigen::Matrix3d any_matrix(Random& random) {
+  Eigen::Matrix3d m;
+  for (double& x : m.reshaped()) x = random.uniform(-1, 1);
+  return m;
+}
+
+void expect_same_stamp(const Stamp& a, const Stamp& b) {
+  EXPECT_EQ(a.time_ns, b.time_ns);
+  EXPECT_EQ(a.host_time_ns, b.host_time_ns);
+  EXPECT_EQ(a.sequence, b.sequence);
+}
+
+TEST(Messages, ImuAndMagnetometerRoundTrip) {
+  Random random(3);
+  for (int i = 0; i < 100; ++i) {
+    ImuMeasurement imu;
+    fill_stamp(random, imu);
+    imu.angular_velocity = any_vector(random);
+    imu.specific_force = any_vector(random);
+    const ImuMeasurement back = from_message(over_the_wire(to_message(imu)));
+    expect_same_stamp(imu, back);
+    EXPECT_EQ(imu.angular_velocity, back.angular_velocity);
+    EXPECT_EQ(imu.specific_force, back.specific_force);
+
+    MagnetometerMeasurement field;
+    fill_stamp(random, field);
+    field.magnetic_field = any_vector(random);
+    const MagnetometerMeasurement field_back = from_message(over_the_wire(to_message(field)));
+    expect_same_stamp(field, field_back);
+    EXPECT_EQ(field.magnetic_field, field_back.magnetic_field);
+  }
+}
+
+TEST(Messages, NotANumberPasses) {
+  ImuMeasurement imu;
+  imu.time_ns = 1;
+  imu.angular_velocity.setConstant(std::numeric_limits<double>::quiet_NaN());
+  imu.specific_force.setConstant(-std::numeric_limits<double>::infinity());
+  const ImuMeasurement back = from_message(over_the_wire(to_message(imu)));
+  EXPECT_TRUE(back.angular_velocity.array().isNaN().all());
+  EXPECT_EQ(back.specific_force, imu.specific_force);
+}
+
+TEST(Messages, ImageRoundTrip) {
+  ImageMeasurement image;
+  Random random(4);
+  fill_stamp(random, image);
+  image.camera = 1;
+  image.width_px = 3;
+  image.height_px = 2;
+  image.row_stride_bytes = 4;
+  image.format = PixelFormat::kGray;
+  image.exposure_ns = 5'000'000;
+  image.data = std::make_shared<const std::vector<std::uint8_t>>(std::vector<std::uint8_t>{1, 2, 3, 0, 4, 5, 6});
+  const ImageMeasurement back = from_message(over_the_wire(to_message(image)));
+  expect_same_stamp(image, back);
+  EXPECT_EQ(back.camera, 1);
+  EXPECT_EQ(back.width_px, 3);
+  EXPECT_EQ(back.height_px, 2);
+  EXPECT_EQ(back.row_stride_bytes, 4);
+  EXPECT_EQ(back.format, PixelFormat::kGray);
+  EXPECT_EQ(back.exposure_ns, 5'000'000);
+  EXPECT_EQ(*back.data, *image.data);
+}
+
+TEST(Messages, GpsRoundTrip) {
+  GpsMeasurement gps;
+  Random random(5);
+  fill_stamp(random, gps);
+  gps.fix = GpsFixType::kFixed;
+  gps.satellites = 17;
+  gps.gps_time_ns = 1'300'000'000'123'456'789;
+  gps.latitude = 0.6;
+  gps.longitude = -1.5;
+  gps.altitude = 301.25;
+  gps.position_cov = any_matrix(random);
+  gps.velocity_enu = any_vector(random);
+  gps.velocity_cov = any_matrix(random);
+  const GpsMeasurement back = from_message(over_the_wire(to_message(gps)));
+  expect_same_stamp(gps, back);
+  EXPECT_EQ(back.fix, GpsFixType::kFixed);
+  EXPECT_EQ(back.satellites, 17);
+  EXPECT_EQ(back.gps_time_ns, gps.gps_time_ns);
+  EXPECT_EQ(back.latitude, gps.latitude);
+  EXPECT_EQ(back.longitude, gps.longitude);
+  EXPECT_EQ(back.altitude, gps.altitude);
+  EXPECT_EQ(back.position_cov, gps.position_cov);
+  EXPECT_EQ(back.velocity_enu, gps.velocity_enu);
+  EXPECT_EQ(back.velocity_cov, gps.velocity_cov);
+}
+
+TEST(Messages, ReferenceRoundTripKeepsTheOrderOfTheQuaternion) {
+  ReferenceMeasurement reference;
+  Random random(6);
+  fill_stamp(random, reference);
+  reference.q_world_body = Eigen::Quaterniond(0.1, 0.2, 0.3, 0.4);
+  reference.position = any_vector(random);
+  reference.velocity = any_vector(random);
+  reference.score = false;
+  const reference_t message = over_the_wire(to_message(reference));
+  EXPECT_EQ(message.q_world_body_wxyz[0], 0.1);
+  EXPECT_EQ(message.q_world_body_wxyz[3], 0.4);
+  const ReferenceMeasurement back = from_message(message);
+  expect_same_stamp(reference, back);
+  EXPECT_EQ(back.q_world_body.coeffs(), reference.q_world_body.coeffs());
+  EXPECT_EQ(back.position, reference.position);
+  EXPECT_EQ(back.velocity, reference.velocity);
+  EXPECT_FALSE(back.score);
+}
+
+TEST(Messages, EstimateRoundTripWithCovariance) {
+  Random random(7);
+  Estimate estimate;
+  estimate.time_ns = 42;
+  estimate.host_time_ns = 43;
+  estimate.sequence = 44;
+  estimate.valid = kValidOrientation | kValidCovariance;
+  estimate.status = kMagnetometerDisturbed | kGap;
+  estimate.q_world_body = Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5);
+  estimate.position = any_vector(random);
+  estimate.velocity = any_vector(random);
+  estimate.angular_velocity = any_vector(random);
+  estimate.gyroscope_bias = any_vector(random);
+  estimate.accelerometer_bias = any_vector(random);
+  estimate.covariance.setRandom();
+  estimate.covariance_dim = 6;
+  const estimate_t message = over_the_wire(to_message(estimate, "madgwick", "ENU"));
+  EXPECT_EQ(message.method, "madgwick");
+  EXPECT_EQ(message.world, "ENU");
+  const Estimate back = from_message(message);
+  EXPECT_EQ(back.time_ns, 42);
+  EXPECT_EQ(back.host_time_ns, 43);
+  EXPECT_EQ(back.sequence, 44);
+  EXPECT_EQ(back.valid, estimate.valid);
+  EXPECT_EQ(back.status, estimate.status);
+  EXPECT_EQ(back.q_world_body.coeffs(), estimate.q_world_body.coeffs());
+  EXPECT_EQ(back.position, estimate.position);
+  EXPECT_EQ(back.velocity, estimate.velocity);
+  EXPECT_EQ(back.angular_velocity, estimate.angular_velocity);
+  EXPECT_EQ(back.gyroscope_bias, estimate.gyroscope_bias);
+  EXPECT_EQ(back.accelerometer_bias, estimate.accelerometer_bias);
+  EXPECT_EQ(back.covariance_dim, 6);
+  EXPECT_EQ((back.covariance.topLeftCorner<6, 6>()), (estimate.covariance.topLeftCorner<6, 6>()));
+}
+
+// The bits of a message are those of the library: from_message() and to_message() pass them on as a number.
+TEST(Messages, BitsAreThoseOfTheLibrary) {
+  EXPECT_EQ(estimate_t::VALID_ORIENTATION, static_cast<int>(kValidOrientation));
+  EXPECT_EQ(estimate_t::VALID_HEADING, static_cast<int>(kValidHeading));
+  EXPECT_EQ(estimate_t::VALID_COVARIANCE, static_cast<int>(kValidCovariance));
+  EXPECT_EQ(estimate_t::STATUS_INITIALISING, static_cast<int>(kInitialising));
+  EXPECT_EQ(estimate_t::STATUS_MAGNETOMETER_DISTURBED, static_cast<int>(kMagnetometerDisturbed));
+  EXPECT_EQ(estimate_t::STATUS_NOT_FINITE, static_cast<int>(kNotFinite));
+  EXPECT_EQ(estimate_t::STATUS_GAP, static_cast<int>(kGap));
+  EXPECT_EQ(image_t::PIXEL_FORMAT_GRAY, static_cast<int>(PixelFormat::kGray));
+  EXPECT_EQ(image_t::PIXEL_FORMAT_BGR, static_cast<int>(PixelFormat::kBgr));
+  EXPECT_EQ(image_t::PIXEL_FORMAT_RGB, static_cast<int>(PixelFormat::kRgb));
+  EXPECT_EQ(image_t::PIXEL_FORMAT_MJPEG, static_cast<int>(PixelFormat::kMjpeg));
+  EXPECT_EQ(gps_fix_t::FIX_FIXED, static_cast<int>(GpsFixType::kFixed));
+}
+
+void expect_data_error(const std::function<void()>& action, const std::string& field) {
+  try {
+    action();
+    FAIL() << "accepted although " << field << " is wrong";
+  } catch (const DataError& error) {
+    EXPECT_NE(std::string(error.what()).find(field), std::string::npos) << error.what();
+  }
+}
+
+TEST(Messages, RefusesWhatNoSensorCanHaveSent) {
+  ImuMeasurement imu;
+  imu.time_ns = 1;
+  imu_t no_time = to_message(imu);
+  no_time.time_ns = kNoTime;
+  expect_data_error([&] { from_message(no_time); }, "time_ns");
+
+  image_t image{};
+  image.width = 4;
+  image.height = 4;
+  image.row_stride = 4;
+  image.pixelformat = image_t::PIXEL_FORMAT_GRAY;
+  image.data.resize(16);
+  image.size = 16;
+  EXPECT_NO_THROW(from_message(image));
+  const auto with = [&](auto change) {
+    image_t wrong = image;
+    change(wrong);
+    return wrong;
+  };
+  expect_data_error([&] { from_message(with([](image_t& m) { m.width = -4; })); }, "width");
+  expect_data_error([&] { from_message(with([](image_t& m) { m.height = 0; })); }, "height");
+  expect_data_error([&] { from_message(with([](image_t& m) { m.row_stride = 3; })); }, "row_stride");
+  expect_data_error([&] { from_message(with([](image_t& m) { m.height = 2'000'000'000; })); }, "size");
+  expect_data_error([&] { from_message(with([](image_t& m) { m.size = 17; })); }, "size");
+  expect_data_error([&] { from_message(with([](image_t& m) { m.pixelformat = 7; })); }, "pixelformat");
+
+  gps_fix_t fix{};
+  fix.fix_type = 9;
+  expect_data_error([&] { from_message(fix); }, "fix_type");
+
+  estimate_t estimate{};
+  estimate.covariance_dim = 16;
+  expect_data_error([&] { from_message(estimate); }, "covariance_dim");
+}
+
+}  // namespace
+}  // namespace loc
