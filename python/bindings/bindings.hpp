@@ -1,0 +1,13 @@
+// One function per file of bindings: each adds the classes and functions of one folder of libloc/ to the module.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace locpy {
+
+void bind_core(pybind11::module_& m);
+void bind_geometry(pybind11::module_& m);
+void bind_sensors(pybind11::module_& m);
+void bind_estimators(pybind11::module_& m);
+
+}  // namespace locpy

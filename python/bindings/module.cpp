@@ -1,0 +1,14 @@
+// The extension module libloc._core. Order matters: a class must be known before a signature names it.
+#include "bindings.hpp"
+#include "libloc/core/check.hpp"
+
+PYBIND11_MODULE(_core, m) {
+  m.doc() = "libloc's C++ core. Use it through the package libloc.";
+  // std::invalid_argument, the caller's mistake, is a ValueError by pybind11's own rules.
+  pybind11::register_exception<loc::DataError>(m, "DataError", PyExc_ValueError).doc() =
+      "What is wrong in a file or message: where (file, line or byte), which field, which value.";
+  locpy::bind_core(m);
+  locpy::bind_geometry(m);
+  locpy::bind_sensors(m);
+  locpy::bind_estimators(m);
+}

@@ -1,0 +1,63 @@
+// A whole recording as NumPy arrays, one set of them per stream.
+#pragma once
+
+#include <pybind11/numpy.h>
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "libloc/io/source.hpp"
+
+namespace locpy {
+
+namespace py = pybind11;
+
+std::map<std::string, std::int64_t> as_map(const loc::NamedCounts& counts);
+
+/// Hands the vector over to Python: no copy. @param columns 0: one dimension.
+template <class T>
+py::array_t<T> hand_over(std::vector<T>&& values, py::ssize_t columns = 0) {
+  auto owned = std::make_unique<std::vector<T>>(std::move(values));
+  T* data = owned->data();
+  const auto size = static_cast<py::ssize_t>(owned->size());
+  const py::capsule owner(owned.release(), [](void* vector) { delete static_cast<std::vector<T>*>(vector); });
+  if (columns == 0) return py::array_t<T>(size, data, owner);
+  return py::array_t<T>({size / columns, columns}, data, owner);
+}
+
+struct ImuColumns {
+  std::vector<loc::TimeNs> times_ns;
+  std::vector<double> angular_velocity;
+  std::vector<double> specific_force;
+};
+struct MagnetometerColumns {
+  std::vector<loc::TimeNs> times_ns;
+  std::vector<double> magnetic_field;
+};
+struct ReferenceColumns {
+  std::vector<loc::TimeNs> times_ns;
+  std::vector<double> q_world_body_wxyz;
+  std::vector<double> position;
+  std::vector<double> velocity;
+  std::vector<std::uint8_t> score;
+};
+struct GpsColumns {
+  std::vector<loc::TimeNs> times_ns;
+  std::vector<double> latitude_longitude_altitude;
+  std::vector<double> velocity_enu;
+  std::vector<std::int8_t> fix;
+};
+
+struct Columns {
+  ImuColumns imu;
+  MagnetometerColumns magnetometer;
+  ReferenceColumns reference;
+  GpsColumns gps;
+  std::int64_t images = 0;
+
+  void add(const loc::Measurement& measurement);
+};
+
+}  // namespace locpy

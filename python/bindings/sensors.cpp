@@ -1,0 +1,262 @@
+// sensors/: measurements, noise of an IMU, the rig.
+#include <pybind11/native_enum.h>
+#include <pybind11/stl.h>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "libloc/sensors/imu_noise.hpp"
+#include "libloc/sensors/measurements.hpp"
+#include "libloc/sensors/rig.hpp"
+
+namespace locpy {
+namespace {
+
+using loc::CameraCalibration;
+using loc::GpsCalibration;
+using loc::GpsMeasurement;
+using loc::ImageMeasurement;
+using loc::ImuCalibration;
+using loc::ImuMeasurement;
+using loc::ImuNoise;
+using loc::MagnetometerCalibration;
+using loc::MagnetometerMeasurement;
+using loc::ReferenceMeasurement;
+using loc::Rig;
+using loc::Stamp;
+using loc::TriadCalibration;
+
+/// A property that is a vector (3,): Python gets a copy, because a view would let it write past the checks.
+template <class Class, class T>
+void vector_property(Class& c, const char* name, Eigen::Vector3d T::*member, const char* doc) {
+  c.def_property(
+      name, [member](const T& self) { return to_array(self.*member); },
+      [member, name](T& self, const ArrayLike& value) { self.*member = vector3(value, name); }, doc);
+}
+
+template <class Class, class T>
+void matrix_property(Class& c, const char* name, Eigen::Matrix3d T::*member, const char* doc) {
+  c.def_property(
+      name, [member](const T& self) { return to_matrix_array(self.*member); },
+      [member, name](T& self, const ArrayLike& value) { self.*member = matrix(value, name, 3, 3); }, doc);
+}
+
+template <class Class, class T>
+void vector4_property(Class& c, const char* name, Eigen::Vector4d T::*member, const char* doc) {
+  c.def_property(
+      name, [member](const T& self) { return to_array(self.*member); },
+      [member, name](T& self, const ArrayLike& value) { self.*member = matrix(value, name, 4, 1); }, doc);
+}
+
+/// What every measurement has in common.
+template <class T, class... Extra>
+void stamp_properties(py::class_<T, Extra...>& c) {
+  c.def_readwrite("time_ns", &T::time_ns, "Time of measurement [ns].")
+      .def_property(
+          "host_time_ns", [](const T& self) { return optional_time(self.host_time_ns); },
+          [](T& self, std::optional<loc::TimeNs> time) { self.host_time_ns = time.value_or(loc::kNoTime); },
+          "Arrival at the host [ns]; None when unknown.")
+      .def_readwrite("sequence", &T::sequence, "Counts the samples of one stream from 0; -1 when unknown.")
+      .def("__repr__", [](const py::object& self) {
+        return py::str("{}(time_ns={})").format(py::type::of(self).attr("__name__"), self.attr("time_ns"));
+      });
+}
+
+template <class T>
+T stamped(loc::TimeNs time_ns) {
+  T m{};
+  m.time_ns = time_ns;
+  return m;
+}
+
+void bind_measurements(py::module_& m) {
+  py::class_<ImuMeasurement> imu(m, "ImuMeasurement", "One IMU sample, in the body frame.");
+  imu.def(py::init([](loc::TimeNs time_ns, const ArrayLike& omega, const ArrayLike& force) {
+            auto out = stamped<ImuMeasurement>(time_ns);
+            out.angular_velocity = vector3(omega, "angular_velocity");
+            out.specific_force = vector3(force, "specific_force");
+            return out;
+          }),
+          py::arg("time_ns"), py::arg("angular_velocity"), py::arg("specific_force"));
+  stamp_properties(imu);
+  vector_property(imu, "angular_velocity", &ImuMeasurement::angular_velocity, "(3,) [rad/s]");
+  vector_property(imu, "specific_force", &ImuMeasurement::specific_force, "(3,) [m/s^2], at rest +9.81 upwards");
+
+  py::class_<MagnetometerMeasurement> magnetometer(m, "MagnetometerMeasurement",
+                                                   "One magnetometer sample, in the body frame.");
+  magnetometer.def(py::init([](loc::TimeNs time_ns, const ArrayLike& field) {
+                     auto out = stamped<MagnetometerMeasurement>(time_ns);
+                     out.magnetic_field = vector3(field, "magnetic_field");
+                     return out;
+                   }),
+                   py::arg("time_ns"), py::arg("magnetic_field"));
+  stamp_properties(magnetometer);
+  vector_property(magnetometer, "magnetic_field", &MagnetometerMeasurement::magnetic_field, "(3,) [T]");
+
+  py::class_<ReferenceMeasurement> reference(
+      m, "ReferenceMeasurement", "Pose by a reference system, for evaluation. What it does not know is NaN.");
+  reference.def(py::init([](loc::TimeNs time_ns, const ArrayLike& q, const ArrayLike& position,
+                            const ArrayLike& velocity, bool score) {
+                  auto out = stamped<ReferenceMeasurement>(time_ns);
+                  const Eigen::Vector4d wxyz = matrix(q, "q_world_body_wxyz", 4, 1);
+                  out.q_world_body = Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+                  out.position = vector3(position, "position");
+                  out.velocity = vector3(velocity, "velocity");
+                  out.score = score;
+                  return out;
+                }),
+                py::arg("time_ns"), py::arg("q_world_body_wxyz"), py::arg("position"), py::arg("velocity"),
+                py::arg("score") = true);
+  stamp_properties(reference);
+  reference.def_property_readonly("q_world_body_wxyz",
+                                  [](const ReferenceMeasurement& self) { return to_wxyz(self.q_world_body); });
+  vector_property(reference, "position", &ReferenceMeasurement::position, "of body in world (3,) [m]");
+  vector_property(reference, "velocity", &ReferenceMeasurement::velocity, "in world (3,) [m/s]");
+  reference.def_readwrite("score", &ReferenceMeasurement::score, "False where the recording says: do not score here.");
+
+  py::native_enum<loc::GpsFixType>(m, "GpsFixType", "enum.IntEnum")
+      .value("NONE", loc::GpsFixType::kNone)
+      .value("TIME", loc::GpsFixType::kTime)
+      .value("FIX_2D", loc::GpsFixType::k2d)
+      .value("FIX_3D", loc::GpsFixType::k3d)
+      .value("DIFFERENTIAL", loc::GpsFixType::kDifferential)
+      .value("FLOAT", loc::GpsFixType::kFloat)
+      .value("FIXED", loc::GpsFixType::kFixed)
+      .finalize();
+  py::class_<GpsMeasurement> gps(m, "GpsMeasurement", "One GPS fix. What the receiver did not say is NaN.");
+  stamp_properties(gps);
+  gps.def_readonly("fix", &GpsMeasurement::fix)
+      .def_readonly("satellites", &GpsMeasurement::satellites, "used; -1 when unknown")
+      .def_property_readonly(
+          "gps_time_ns", [](const GpsMeasurement& self) { return optional_time(self.gps_time_ns); },
+          "since 1980-01-06 without leap seconds; None when unknown")
+      .def_readonly("latitude", &GpsMeasurement::latitude, "[rad], WGS 84")
+      .def_readonly("longitude", &GpsMeasurement::longitude, "[rad]")
+      .def_readonly("altitude", &GpsMeasurement::altitude, "[m] above the ellipsoid")
+      .def_property_readonly(
+          "position_cov", [](const GpsMeasurement& self) { return to_matrix_array(self.position_cov); },
+          "(3, 3) [m^2], east, north, up")
+      .def_property_readonly(
+          "velocity_enu", [](const GpsMeasurement& self) { return to_array(self.velocity_enu); }, "(3,) [m/s]")
+      .def_property_readonly(
+          "velocity_cov", [](const GpsMeasurement& self) { return to_matrix_array(self.velocity_cov); },
+          "(3, 3) [m^2/s^2]");
+
+  py::class_<ImageMeasurement> image(m, "ImageMeasurement", "One picture, raw or JPEG.");
+  stamp_properties(image);
+  image.def_readonly("camera", &ImageMeasurement::camera, "index of the camera in the rig")
+      .def_readonly("width_px", &ImageMeasurement::width_px)
+      .def_readonly("height_px", &ImageMeasurement::height_px)
+      .def_readonly("row_stride_bytes", &ImageMeasurement::row_stride_bytes, "0 for JPEG")
+      .def_property_readonly(
+          "fourcc",
+          [](const ImageMeasurement& self) {
+            const auto code = static_cast<std::uint32_t>(self.format);
+            std::string text;
+            for (unsigned shift = 0; shift < 32; shift += 8) text += static_cast<char>((code >> shift) & 0xffU);
+            return text;
+          },
+          "\"GREY\", \"BGR3\", \"RGB3\" or \"MJPG\"")
+      .def_readonly("exposure_ns", &ImageMeasurement::exposure_ns, "length of the exposure [ns]; 0 when unknown")
+      .def_property_readonly(
+          "data",
+          [](const ImageMeasurement& self) {
+            if (!self.data) return py::bytes();
+            return py::bytes(reinterpret_cast<const char*>(self.data->data()), self.data->size());
+          },
+          "bytes of the picture");
+}
+
+void bind_noise(py::module_& m) {
+  const ImuNoise d;
+  py::class_<ImuNoise>(m, "ImuNoise", "Noise of an IMU as continuous densities.")
+      .def(py::init([](double gn, double gw, double an, double aw, double gb, double ab) {
+             const ImuNoise noise{gn, gw, an, aw, gb, ab};
+             noise.check();
+             return noise;
+           }),
+           py::kw_only(), py::arg("gyroscope_noise_density") = d.gyroscope_noise_density,
+           py::arg("gyroscope_random_walk") = d.gyroscope_random_walk,
+           py::arg("accelerometer_noise_density") = d.accelerometer_noise_density,
+           py::arg("accelerometer_random_walk") = d.accelerometer_random_walk,
+           py::arg("gyroscope_bias_sigma") = d.gyroscope_bias_sigma,
+           py::arg("accelerometer_bias_sigma") = d.accelerometer_bias_sigma,
+           "ValueError names a field that is negative or not finite.")
+      .def_readwrite("gyroscope_noise_density", &ImuNoise::gyroscope_noise_density, "[rad/s/sqrt(Hz)], white")
+      .def_readwrite("gyroscope_random_walk", &ImuNoise::gyroscope_random_walk, "[rad/s^2/sqrt(Hz)], of the bias")
+      .def_readwrite("accelerometer_noise_density", &ImuNoise::accelerometer_noise_density, "[m/s^2/sqrt(Hz)], white")
+      .def_readwrite("accelerometer_random_walk", &ImuNoise::accelerometer_random_walk, "[m/s^3/sqrt(Hz)], of the bias")
+      .def_readwrite("gyroscope_bias_sigma", &ImuNoise::gyroscope_bias_sigma, "[rad/s], turn-on")
+      .def_readwrite("accelerometer_bias_sigma", &ImuNoise::accelerometer_bias_sigma, "[m/s^2], turn-on")
+      .def("check", &ImuNoise::check, "ValueError names a field that is out of range.");
+  py::class_<loc::DiscreteImuNoise>(m, "DiscreteImuNoise", "Deviations of discrete samples.")
+      .def_readonly("sigma_angular_velocity", &loc::DiscreteImuNoise::sigma_angular_velocity, "[rad/s]")
+      .def_readonly("sigma_specific_force", &loc::DiscreteImuNoise::sigma_specific_force, "[m/s^2]")
+      .def_readonly("sigma_gyroscope_bias_step", &loc::DiscreteImuNoise::sigma_gyroscope_bias_step, "[rad/s]")
+      .def_readonly("sigma_accelerometer_bias_step", &loc::DiscreteImuNoise::sigma_accelerometer_bias_step, "[m/s^2]");
+  m.def("discretise", &loc::discretise, py::arg("noise"), py::arg("dt_s"), "Deviations of samples dt_s [s] apart.");
+}
+
+void bind_calibrations(py::module_& m) {
+  py::class_<TriadCalibration> triad(m, "TriadCalibration", "corrected = matrix @ (raw - bias)");
+  triad.def(py::init<>());
+  vector_property(triad, "bias", &TriadCalibration::bias, "(3,), in the sensor's unit");
+  matrix_property(triad, "matrix", &TriadCalibration::matrix, "(3, 3): scale, misalignment, soft iron, rotation");
+
+  py::class_<ImuCalibration>(m, "ImuCalibration")
+      .def(py::init<>())
+      .def_readwrite("rate_hz", &ImuCalibration::rate_hz, "nominal; 0 when unknown")
+      .def_readwrite("noise", &ImuCalibration::noise)
+      .def_readwrite("gyroscope", &ImuCalibration::gyroscope, "[rad/s]")
+      .def_readwrite("accelerometer", &ImuCalibration::accelerometer, "[m/s^2]");
+  py::class_<MagnetometerCalibration>(m, "MagnetometerCalibration")
+      .def(py::init<>())
+      .def_readwrite("triad", &MagnetometerCalibration::triad, "[T], result in body axes");
+  py::class_<GpsCalibration> gps(m, "GpsCalibration");
+  gps.def(py::init<>());
+  vector_property(gps, "antenna_in_body", &GpsCalibration::antenna_in_body, "lever arm (3,) [m]");
+
+  py::native_enum<loc::DistortionModel>(m, "DistortionModel", "enum.Enum")
+      .value("NONE", loc::DistortionModel::kNone)
+      .value("RADTAN", loc::DistortionModel::kRadtan)
+      .value("EQUIDISTANT", loc::DistortionModel::kEquidistant)
+      .finalize();
+  py::class_<CameraCalibration> camera(m, "CameraCalibration");
+  camera.def(py::init<>())
+      .def_readwrite("name", &CameraCalibration::name)
+      .def_readwrite("width_px", &CameraCalibration::width_px)
+      .def_readwrite("height_px", &CameraCalibration::height_px)
+      .def_readwrite("distortion_model", &CameraCalibration::distortion_model)
+      .def_readwrite("T_body_camera", &CameraCalibration::T_body_camera)
+      .def_readwrite("time_offset_s", &CameraCalibration::time_offset_s, "t_imu = t_camera + time_offset_s")
+      .def_readwrite("rate_hz", &CameraCalibration::rate_hz, "nominal; 0 when unknown");
+  vector4_property(camera, "intrinsics_px", &CameraCalibration::intrinsics_px, "(4,): fx, fy, cx, cy");
+  vector4_property(camera, "distortion", &CameraCalibration::distortion,
+                   "(4,): k1 k2 p1 p2 (radtan) or k1..k4 (equidistant)");
+}
+
+void bind_rig(py::module_& m) {
+  py::class_<Rig>(m, "Rig", "The sensors of one device; the body frame is the IMU's. A sensor that is absent is None.")
+      .def(py::init<>())
+      .def_readwrite("imu", &Rig::imu)
+      .def_readwrite("magnetometer", &Rig::magnetometer)
+      .def_readwrite("gps", &Rig::gps)
+      .def_property(
+          "cameras", [](const Rig& self) { return self.cameras; },
+          [](Rig& self, std::vector<CameraCalibration> cameras) { self.cameras = std::move(cameras); },
+          "Copies of the cameras: assign a list to change them.")
+      .def("check", &Rig::check, "ValueError names a field that is out of range.")
+      .def(
+          "calibrated", [](const Rig& self, const loc::Measurement& raw) { return loc::calibrated(self, raw); },
+          py::arg("measurement"), "The measurement as the calibration corrects it.");
+}
+
+}  // namespace
+
+void bind_sensors(py::module_& m) {
+  bind_noise(m);
+  bind_measurements(m);
+  bind_calibrations(m);
+  bind_rig(m);
+}
+
+}  // namespace locpy
