@@ -1,10 +1,10 @@
 """Tells where a moving camera is: sensors in, orientation and trajectory out.
 
-SI units and radians; quaternions are Hamilton, wxyz, body to world; times are int64 nanoseconds. Frames: world
-has z up (unless NED is chosen), body is the IMU; T_a_b takes coordinates of b to coordinates of a.
+SI units and radians; quaternions are Hamilton, wxyz, body to world; times are int64 nanoseconds. Frames:
+world has z up (unless NED is chosen), body is the IMU; T_a_b takes coordinates of b to coordinates of a.
 """
 
 from libloc._core import *  # noqa: F403
-from libloc._core import so3
+from libloc._core import so3 as so3
 
 __version__ = "0.1.0"

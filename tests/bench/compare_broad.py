@@ -9,7 +9,7 @@ time of each batch call.
 
 The metric is BROAD's own (Laidig, Caruso, Cereatti, Seel, "BROAD - a benchmark for robust inertial
 orientation estimation", Data 6(7), 2021): no alignment, world is ENU, samples count where `movement` is true
-and both orientations are known. With the error in the world, e = q_estimate * q_truth^-1 = heading * inclination:
+and both orientations are known. The error in world is e = q_estimate * q_truth^-1 = heading * inclination:
     total = 2 acos |e_w|     heading = 2 atan |e_z / e_w|     inclination = 2 acos sqrt(e_w^2 + e_z^2)
 On BROAD's thirty trials VQF has a mean total RMSE of 2.43 degrees and BasicVQF of 3.50: the check of this
 script.

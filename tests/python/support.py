@@ -1,0 +1,59 @@
+"""A small recording with known truth, and where real ones are."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+GRAVITY = 9.80665
+FIELD_ENU = np.array([0.0, 20e-6, -44e-6])  # [T], dip 65.6 deg
+
+
+def data_folder(name: str) -> Path:
+    """A folder of real recordings; skips the test when it is absent."""
+    folder = Path(os.environ.get("LIBLOC_DATA", CHECKOUT.parent / "shared" / "data")) / name
+    if not folder.is_dir():
+        pytest.skip(f"no recordings in {folder} (set LIBLOC_DATA)")
+    return folder
+
+
+def to_scipy(q_wxyz: np.ndarray) -> Rotation:
+    return Rotation.from_quat(np.roll(np.asarray(q_wxyz), -1, axis=-1))
+
+
+def to_wxyz(rotation: Rotation) -> np.ndarray:
+    return np.ascontiguousarray(np.roll(rotation.as_quat(), 1, axis=-1))
+
+
+@dataclass
+class Recording:
+    times_ns: np.ndarray
+    gyro: np.ndarray  # [rad/s]
+    force: np.ndarray  # [m/s^2]
+    field: np.ndarray  # [T]
+    q_true_wxyz: np.ndarray
+
+
+def turning_body(count: int, rate_hz: float = 200.0, seed: int = 1, noise: float = 1.0) -> Recording:
+    """A body that turns about changing axes without accelerating; world is ENU.
+
+    gyro[i] is the mean rate from sample i-1 to sample i, so that its integral is exact.
+    """
+    rng = np.random.default_rng(seed)
+    dt = 1 / rate_hz
+    t = np.arange(count) * dt
+    angles = np.stack([1.2 * np.sin(0.7 * t), 0.8 * np.sin(0.5 * t + 1), 2.0 * np.sin(0.3 * t + 2)], axis=1)
+    rotation = Rotation.from_euler("xyz", angles)
+    gyro = np.zeros((count, 3))
+    gyro[1:] = (rotation[:-1].inv() * rotation[1:]).as_rotvec() / dt
+    force = rotation.inv().apply([0, 0, GRAVITY])
+    field = rotation.inv().apply(FIELD_ENU)
+    gyro += noise * 2e-3 * rng.normal(size=gyro.shape)
+    force += noise * 2e-2 * rng.normal(size=force.shape)
+    field += noise * 2e-7 * rng.normal(size=field.shape)
+    times_ns = np.rint(t * 1e9).astype(np.int64) + 1_700_000_000_000_000_000
+    return Recording(times_ns, gyro, force, field, to_wxyz(rotation))
