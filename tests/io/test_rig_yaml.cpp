@@ -1,0 +1,299 @@
+// The rig as a file: round trips, strictness, and the files of Kalibr and EuRoC.
+#include "libloc/io/rig_yaml.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "libloc/core/random.hpp"
+#include "tests/support/data.hpp"
+#include "tests/support/sources.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace loc {
+namespace {
+
+using test::expect_data_error;
+
+TriadCalibration random_triad(Random& random) {
+  TriadCalibration triad;
+  triad.bias = random.normal3();
+  for (int i = 0; i < 3; ++i) triad.matrix.row(i) = Eigen::Vector3d::Unit(i) + 0.01 * random.normal3();
+  return triad;
+}
+
+Rig full_rig() {
+  Random random(11);
+  Rig rig;
+  rig.imu.emplace();
+  rig.imu->rate_hz = 200;
+  rig.imu->noise.gyroscope_noise_density = 1.0 / 3;
+  rig.imu->noise.accelerometer_random_walk = 1e-300;
+  rig.imu->gyroscope = random_triad(random);
+  rig.imu->accelerometer = random_triad(random);
+  rig.magnetometer.emplace();
+  rig.magnetometer->triad = random_triad(random);
+  for (int i = 0; i < 2; ++i) {
+    CameraCalibration camera;
+    camera.name = i == 0 ? "cam0" : "left: \"wide\" # 2";
+    camera.width_px = 752;
+    camera.height_px = 480;
+    camera.intrinsics_px = {458.654, 457.296, 367.215, 248.375};
+    camera.distortion_model = i == 0 ? DistortionModel::kRadtan : DistortionModel::kEquidistant;
+    camera.distortion = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05};
+    camera.T_body_camera = {random.rotation(), random.normal3()};
+    camera.time_offset_s = -1.0 / 7;
+    camera.rate_hz = 20;
+    rig.cameras.push_back(camera);
+  }
+  rig.gps = GpsCalibration{{0.1, -0.2, 1.0 / 3}};
+  return rig;
+}
+
+void expect_same(const TriadCalibration& a, const TriadCalibration& b) {
+  EXPECT_EQ(a.bias, b.bias);
+  EXPECT_EQ(a.matrix, b.matrix);
+}
+
+class RigYaml : public testing::Test {
+ protected:
+  std::filesystem::path file(const std::string& name) const { return folder_.path() / name; }
+  std::string rig_text() {
+    write_rig(file("rig.yaml"), full_rig());
+    return test::read_file(file("rig.yaml"));
+  }
+  // Reads the rig's text with one piece replaced by another.
+  void expect_error(const std::string& from, const std::string& to, const std::vector<std::string>& parts) {
+    std::string text = rig_text();
+    const auto at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from << " is not in\n" << text;
+    text.replace(at, from.size(), to);
+    expect_data_error([&] { read_rig(folder_.write("changed.yaml", text)); }, parts);
+  }
+  test::TempFolder folder_;
+};
+
+TEST_F(RigYaml, what_is_written_is_read_to_the_last_bit) {
+  const Rig rig = full_rig();
+  write_rig(file("rig.yaml"), rig);
+  const Rig back = read_rig(file("rig.yaml"));
+  ASSERT_TRUE(back.imu && back.magnetometer && back.gps);
+  EXPECT_EQ(back.imu->rate_hz, rig.imu->rate_hz);
+  EXPECT_EQ(back.imu->noise.gyroscope_noise_density, rig.imu->noise.gyroscope_noise_density);
+  EXPECT_EQ(back.imu->noise.gyroscope_random_walk, rig.imu->noise.gyroscope_random_walk);
+  EXPECT_EQ(back.imu->noise.accelerometer_noise_density, rig.imu->noise.accelerometer_noise_density);
+  EXPECT_EQ(back.imu->noise.accelerometer_random_walk, rig.imu->noise.accelerometer_random_walk);
+  EXPECT_EQ(back.imu->noise.gyroscope_bias_sigma, rig.imu->noise.gyroscope_bias_sigma);
+  EXPECT_EQ(back.imu->noise.accelerometer_bias_sigma, rig.imu->noise.accelerometer_bias_sigma);
+  expect_same(back.imu->gyroscope, rig.imu->gyroscope);
+  expect_same(back.imu->accelerometer, rig.imu->accelerometer);
+  expect_same(back.magnetometer->triad, rig.magnetometer->triad);
+  EXPECT_EQ(back.gps->antenna_in_body, rig.gps->antenna_in_body);
+  ASSERT_EQ(back.cameras.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const CameraCalibration& a = back.cameras[i];
+    const CameraCalibration& b = rig.cameras[i];
+    EXPECT_EQ(a.name, b.name);
+    EXPECT_EQ(a.width_px, b.width_px);
+    EXPECT_EQ(a.height_px, b.height_px);
+    EXPECT_EQ(a.intrinsics_px, b.intrinsics_px);
+    EXPECT_EQ(a.distortion_model, b.distortion_model);
+    EXPECT_EQ(a.distortion, b.distortion);
+    EXPECT_EQ(a.T_body_camera.rotation.coeffs(), b.T_body_camera.rotation.coeffs());
+    EXPECT_EQ(a.T_body_camera.translation, b.T_body_camera.translation);
+    EXPECT_EQ(a.time_offset_s, b.time_offset_s);
+    EXPECT_EQ(a.rate_hz, b.rate_hz);
+  }
+  const std::string first = test::read_file(file("rig.yaml"));
+  write_rig(file("rig.yaml"), back);
+  EXPECT_EQ(test::read_file(file("rig.yaml")), first);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_.path()), {}), 1) << "nothing temporary is left";
+}
+
+TEST_F(RigYaml, an_empty_rig_is_a_rig) {
+  write_rig(file("rig.yaml"), Rig{});
+  const Rig back = read_rig(file("rig.yaml"));
+  EXPECT_FALSE(back.imu || back.magnetometer || back.gps);
+  EXPECT_TRUE(back.cameras.empty());
+}
+
+TEST_F(RigYaml, the_text_of_the_header_is_read) {
+  const Rig rig = read_rig(folder_.write("hand.yaml",
+                                         "format: libloc-rig-1   # written by hand\n"
+                                         "magnetometer:\n"
+                                         "  bias: [1e-6, 0, 0]\n"
+                                         "  matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n"
+                                         "gps:\n"
+                                         "  antenna_in_body: [0, 0, 0.5]\n"
+                                         "...\n"));
+  EXPECT_EQ(rig.magnetometer->triad.bias.x(), 1e-6);
+  EXPECT_EQ(rig.gps->antenna_in_body.z(), 0.5);
+}
+
+TEST_F(RigYaml, errors_name_file_line_and_key) {
+  expect_error("rate_hz: 200", "rate_hx: 200", {"changed.yaml:", "'imu.rate_hz' is missing"});
+  expect_error("imu:\n", "imu:\n  weight: 3\n", {"changed.yaml:3", "'imu.weight' is not known"});
+  expect_error("rate_hz: 200", "rate_hz: fast", {"changed.yaml:3", "imu.rate_hz", "'fast'"});
+  expect_error("rate_hz: 200", "rate_hz: nan", {"imu.rate_hz", "finite"});
+  expect_error("rate_hz: 200", "rate_hz: 200 # ok\n  rate_hz: 100", {"changed.yaml:4", "imu.rate_hz", "twice"});
+  expect_error("rate_hz: 200", "rate_hz: [200]", {"imu.rate_hz", "not a scalar"});
+  expect_error("[752, 480]", "[752]", {"cameras[0].resolution", "2 numbers"});
+  expect_error("[752, 480]", "[752.5, 480]", {"cameras[0].resolution", "whole"});
+  expect_error("radtan", "fisheye", {"cameras[0].distortion_model", "fisheye"});
+  expect_error("libloc-rig-1", "libloc-rig-2", {"changed.yaml:1", "format"});
+  expect_error("antenna_in_body: [0.1", "antenna_in_body: [[0.1]", {"gps.antenna_in_body"});
+  expect_error("rate_hz: 200", "rate_hz: -1", {"changed.yaml", "imu.rate_hz", "-1"});
+  expect_error("gps:", "gsp:", {"'gsp' is not known"});
+  expect_error("imu:", "imu: [", {"changed.yaml:"});
+  expect_error("q_wxyz: [", "q_wxyz: [1, ", {"q_wxyz", "4 numbers"});
+  expect_data_error([&] { read_rig(file("none.yaml")); }, {"none.yaml", "no such file"});
+  expect_data_error([&] { read_rig(folder_.path()); }, {"not a file"});
+  expect_data_error([&] { read_rig(folder_.write("e.yaml", "")); }, {"empty"});
+  expect_data_error([&] { read_rig(folder_.write("e.yaml", "- 1\n...\n")); }, {"must hold keys"});
+}
+
+TEST_F(RigYaml, quaternions_are_normalised_or_refused) {
+  Rig rig;
+  rig.cameras.push_back(full_rig().cameras[0]);
+  rig.cameras[0].T_body_camera.rotation = Eigen::Quaterniond(1, 0, 0, 0);
+  write_rig(file("rig.yaml"), rig);
+  std::string text = test::read_file(file("rig.yaml"));
+  const auto at = text.find("[1, 0, 0, 0]");
+  ASSERT_NE(at, std::string::npos);
+  const auto with = [&](const std::string& q) {
+    std::string changed = text;
+    return folder_.write("q.yaml", changed.replace(at, 12, q));
+  };
+  EXPECT_DOUBLE_EQ(read_rig(with("[0.7071, 0.7071, 0, 0]")).cameras[0].T_body_camera.rotation.norm(), 1);
+  expect_data_error([&] { read_rig(with("[0.7, 0.7, 0, 0]")); }, {"q_wxyz", "norm"});
+  rig.cameras[0].T_body_camera.rotation = Eigen::Quaterniond(1, 0.1, 0, 0);
+  EXPECT_THROW(write_rig(file("rig.yaml"), rig), std::invalid_argument);
+  EXPECT_EQ(test::read_file(file("rig.yaml")), text) << "the old file stays";
+}
+
+TEST_F(RigYaml, cut_at_any_byte_is_refused) {
+  const std::string text = rig_text();
+  for (std::size_t size = 0; size < text.size(); ++size) {
+    EXPECT_THROW(read_rig(folder_.write("cut.yaml", text.substr(0, size))), DataError) << size;
+  }
+  EXPECT_NO_THROW(read_rig(folder_.write("cut.yaml", text)));
+}
+
+TEST_F(RigYaml, carriage_returns_are_no_matter) {
+  std::string text = rig_text();
+  std::string dos;
+  for (const char c : text) dos += c == '\n' ? std::string("\r\n") : std::string(1, c);
+  EXPECT_EQ(read_rig(folder_.write("dos.yaml", dos)).cameras.size(), 2U);
+}
+
+const std::string kCamchain =
+    "cam0:\n"
+    "  T_cam_imu:\n"
+    "  - [0.0, -1.0, 0.0, 0.1]\n"
+    "  - [1.0, 0.0, 0.0, 0.2]\n"
+    "  - [0.0, 0.0, 1.0, 0.3]\n"
+    "  - [0.0, 0.0, 0.0, 1.0]\n"
+    "  cam_overlaps: [1]\n"
+    "  camera_model: pinhole\n"
+    "  distortion_coeffs: [-0.28, 0.07, 0.0002, 1.7e-05]\n"
+    "  distortion_model: radtan\n"
+    "  intrinsics: [458.654, 457.296, 367.215, 248.375]\n"
+    "  resolution: [752, 480]\n"
+    "  rostopic: /cam0/image_raw\n"
+    "  timeshift_cam_imu: 0.0025\n";
+
+TEST_F(RigYaml, kalibr_gives_the_camera_from_the_imu_and_we_the_other_way_round) {
+  const auto cameras = read_kalibr_camchain(folder_.write("camchain.yaml", kCamchain));
+  ASSERT_EQ(cameras.size(), 1U);
+  EXPECT_EQ(cameras[0].time_offset_s, 0.0025);
+  EXPECT_EQ(cameras[0].distortion_model, DistortionModel::kRadtan);
+  // The IMU's origin lies at (0.1, 0.2, 0.3) in the camera; the camera's in the IMU's axes at -R^T t.
+  EXPECT_LT((cameras[0].T_body_camera.translation - Eigen::Vector3d(-0.2, 0.1, -0.3)).norm(), 1e-15);
+  EXPECT_LT((cameras[0].T_body_camera * Eigen::Vector3d(0.1, 0.2, 0.3)).norm(), 1e-15);
+  // x of the IMU is y of the camera.
+  EXPECT_LT((cameras[0].T_body_camera.rotation * Eigen::Vector3d::UnitY() - Eigen::Vector3d::UnitX()).norm(), 1e-15);
+}
+
+TEST_F(RigYaml, kalibr_files_that_are_written_are_read) {
+  Rig rig = full_rig();
+  rig.cameras[1].distortion_model = DistortionModel::kNone;
+  rig.cameras[1].distortion.setZero();
+  write_kalibr_camchain(file("camchain.yaml"), rig);
+  write_kalibr_imu(file("imu.yaml"), rig);
+  const auto cameras = read_kalibr_camchain(file("camchain.yaml"));
+  ASSERT_EQ(cameras.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_LT(cameras[i].T_body_camera.boxminus(rig.cameras[i].T_body_camera).norm(), 1e-14);
+    EXPECT_EQ(cameras[i].intrinsics_px, rig.cameras[i].intrinsics_px);
+    EXPECT_EQ(cameras[i].distortion, rig.cameras[i].distortion);
+    EXPECT_EQ(cameras[i].distortion_model, rig.cameras[i].distortion_model);
+    EXPECT_EQ(cameras[i].time_offset_s, rig.cameras[i].time_offset_s);
+  }
+  const ImuCalibration imu = read_kalibr_imu(file("imu.yaml"));
+  EXPECT_EQ(imu.noise.gyroscope_noise_density, rig.imu->noise.gyroscope_noise_density);
+  EXPECT_EQ(imu.noise.accelerometer_random_walk, rig.imu->noise.accelerometer_random_walk);
+  EXPECT_EQ(imu.rate_hz, 200);
+  EXPECT_THROW(write_kalibr_camchain(file("x.yaml"), Rig{}), std::invalid_argument);
+  EXPECT_THROW(write_kalibr_imu(file("x.yaml"), Rig{}), std::invalid_argument);
+}
+
+TEST_F(RigYaml, a_camchain_without_imu_is_chained_from_the_first_camera) {
+  Rig rig = full_rig();
+  rig.cameras[0].T_body_camera = Pose3{};
+  write_kalibr_camchain(file("camchain.yaml"), rig);
+  std::string text = test::read_file(file("camchain.yaml"));
+  for (auto at = text.find("T_cam_imu:"); at != std::string::npos; at = text.find("T_cam_imu:")) {
+    text.replace(at, 10, "T_unused:");
+  }
+  const auto cameras = read_kalibr_camchain(folder_.write("cams.yaml", text));
+  ASSERT_EQ(cameras.size(), 2U);
+  EXPECT_LT(cameras[1].T_body_camera.boxminus(rig.cameras[1].T_body_camera).norm(), 1e-14);
+}
+
+TEST_F(RigYaml, errors_in_foreign_files_name_file_line_and_key) {
+  const auto changed = [&](const std::string& from, const std::string& to) {
+    std::string text = kCamchain;
+    text.replace(text.find(from), from.size(), to);
+    return folder_.write("c.yaml", text);
+  };
+  expect_data_error([&] { read_kalibr_camchain(changed("pinhole", "omni")); }, {"c.yaml:8", "camera_model"});
+  expect_data_error([&] { read_kalibr_camchain(changed("[1.0, 0.0, 0.0, 0.2]", "[1.0, 0.5, 0.0, 0.2]")); },
+                    {"c.yaml", "cam0.T_cam_imu"});
+  expect_data_error([&] { read_kalibr_camchain(changed("timeshift_cam_imu", "timeshift")); }, {"timeshift_cam_imu"});
+  expect_data_error([&] { read_kalibr_camchain(changed("cam0", "camera")); }, {"no cam0"});
+  expect_data_error([&] { read_kalibr_camchain(changed("0.0025\n", "0.0025")); }, {"cut"});
+  for (std::size_t size = 0; size < kCamchain.size(); ++size) {
+    EXPECT_THROW(read_kalibr_camchain(folder_.write("cut.yaml", kCamchain.substr(0, size))), DataError) << size;
+  }
+}
+
+TEST_F(RigYaml, reads_the_sensor_files_of_euroc) {
+  LOC_DATA_OR_SKIP(imu_file, "euroc-v101-tracks/imu0-sensor.yaml");
+  LOC_DATA_OR_SKIP(camera_file, "euroc-v101-tracks/cam0-sensor.yaml");
+  const ImuCalibration imu = read_euroc_imu(imu_file);
+  EXPECT_EQ(imu.rate_hz, 200);
+  EXPECT_EQ(imu.noise.gyroscope_noise_density, 1.6968e-04);
+  EXPECT_EQ(imu.noise.accelerometer_random_walk, 3e-3);
+  const CameraCalibration camera = read_euroc_camera(camera_file);
+  EXPECT_EQ(camera.intrinsics_px, Eigen::Vector4d(458.654, 457.296, 367.215, 248.375));
+  EXPECT_EQ(camera.distortion_model, DistortionModel::kRadtan);
+  EXPECT_EQ(camera.rate_hz, 20);
+  EXPECT_LT((camera.T_body_camera.translation - Eigen::Vector3d(-0.0216401454975, -0.064676986768, 0.00981073058949)).norm(),
+            1e-12);
+  // The camera looks along +y … of the body: z of the camera in body axes is the third column of T_BS.
+  EXPECT_NEAR((camera.T_body_camera.rotation * Eigen::Vector3d::UnitZ()).z(), 0.999660727178, 1e-9);
+  EXPECT_EQ(read_any_rig(camera_file).cameras.size(), 1U);
+  EXPECT_TRUE(read_any_rig(imu_file).imu);
+}
+
+TEST_F(RigYaml, the_kind_of_a_file_is_found_out) {
+  write_rig(file("rig.yaml"), full_rig());
+  EXPECT_EQ(read_any_rig(file("rig.yaml")).cameras.size(), 2U);
+  EXPECT_EQ(read_any_rig(folder_.write("camchain.yaml", kCamchain)).cameras.size(), 1U);
+  write_kalibr_imu(file("imu.yaml"), full_rig());
+  EXPECT_TRUE(read_any_rig(file("imu.yaml")).imu);
+  expect_data_error([&] { read_any_rig(folder_.write("other.yaml", "a: 1\n")); }, {"other.yaml", "neither"});
+}
+
+}  // namespace
+}  // namespace loc
