@@ -17,7 +17,8 @@ function(loc_target_options target)
   set_target_properties(${target} PROPERTIES CXX_STANDARD 20 CXX_STANDARD_REQUIRED ON CXX_EXTENSIONS OFF
                         POSITION_INDEPENDENT_CODE ON)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
-                         -Wnon-virtual-dtor -Woverloaded-virtual -Werror ${loc_sanitize_flags})
+                         -Wnon-virtual-dtor -Woverloaded-virtual $<$<BOOL:${LOC_WARNINGS_AS_ERRORS}>:-Werror>
+                         ${loc_sanitize_flags})
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
     target_compile_options(${target} PRIVATE -Wno-restrict)  # false alarms on std::string: GCC bug 105651
   endif()

@@ -1,0 +1,33 @@
+# Installs libloc into an empty folder and builds and runs another project against it, then the same project with
+# libloc as a subfolder. cmake -DBUILD_DIR=… -DSOURCE_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX=… -DMODE=… -P run.cmake
+function(run)
+  execute_process(COMMAND ${ARGV} RESULT_VARIABLE result)
+  if(result)
+    list(JOIN ARGV " " command)
+    message(FATAL_ERROR "${command}: ${result}")
+  endif()
+endfunction()
+
+file(REMOVE_RECURSE "${WORK_DIR}")
+set(configure "${CMAKE_COMMAND}" -S "${SOURCE_DIR}/tests/install" -B "${WORK_DIR}/build" -G "${GENERATOR}"
+  "-DCMAKE_CXX_COMPILER=${CXX}" "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}" -DCMAKE_BUILD_TYPE=Release)
+if(MODE STREQUAL "installed")
+  run("${CMAKE_COMMAND}" --install "${BUILD_DIR}" --prefix "${WORK_DIR}/prefix")
+  # Moved: nothing may point to where it was installed first.
+  file(RENAME "${WORK_DIR}/prefix" "${WORK_DIR}/moved")
+  run(${configure} "-DCMAKE_PREFIX_PATH=${WORK_DIR}/moved")
+  file(GLOB_RECURSE exported "${WORK_DIR}/moved/*.cmake")
+  foreach(file IN LISTS exported)
+    file(READ "${file}" text)
+    foreach(path "${SOURCE_DIR}" "${BUILD_DIR}")
+      string(FIND "${text}" "${path}" place)
+      if(NOT place EQUAL -1)
+        message(FATAL_ERROR "${file} names ${path}")
+      endif()
+    endforeach()
+  endforeach()
+else()
+  run(${configure} "-DLIBLOC_SOURCE_DIR=${SOURCE_DIR}")
+endif()
+run("${CMAKE_COMMAND}" --build "${WORK_DIR}/build" --parallel 2 --target uses_core uses_all)
+run("${CMAKE_CTEST_COMMAND}" --test-dir "${WORK_DIR}/build" --output-on-failure --no-tests=error -R "^uses_")
