@@ -84,6 +84,7 @@ MadgwickOptions MadgwickOptions::robust() {
   options.accelerometer_time_constant_s = 1.5;
   options.start_time_s = 5;
   options.rest_bias = true;
+  options.motion_bias = true;
   options.magnetic_rejection = true;
   options.magnetometer_heading_only = true;
   options.magnetometer_weight = 0.25;  // time constant 10 s: a field indoors is worth less than a good gyroscope
@@ -109,6 +110,10 @@ void MadgwickOptions::check() const {
   require_positive("rest_min_duration_s", rest_min_duration_s);
   require_positive("rest_low_pass_s", rest_low_pass_s);
   require_positive("rest_bias_cutoff_hz", rest_bias_cutoff_hz);
+  require_not_negative("motion_bias_start_sigma", motion_bias_start_sigma);
+  require_not_negative("motion_bias_walk", motion_bias_walk);
+  require_positive("motion_bias_noise", motion_bias_noise);
+  require_positive("rest_bias_sigma", rest_bias_sigma);
   require_positive("max_gyroscope_bias", max_gyroscope_bias);
   require_positive("magnetic_norm_tolerance", magnetic_norm_tolerance);
   require_positive("magnetic_dip_tolerance", magnetic_dip_tolerance);
@@ -131,6 +136,8 @@ MadgwickFilter::MadgwickFilter(const MadgwickOptions& options)
       up_z_(options.world == WorldFrame::kNed ? -1 : 1),
       north_axis_(options.world == WorldFrame::kEnu ? 1 : 0),
       cos_dip_tolerance_(std::cos(options.magnetic_dip_tolerance)) {
+  correction_time_s_ = options.beta > 0 ? 0.5 * options.soft_gradient / options.beta : 0;
+  bias_variance_.setConstant(options.motion_bias_start_sigma * options.motion_bias_start_sigma);
   options_.check();
 }
 
@@ -171,6 +178,7 @@ void MadgwickFilter::start(const ImuMeasurement& imu) {
   force_world_ = q_ * imu.specific_force;
   force_time_s_ = 0;
   elapsed_s_ = 0;
+  force_lag_R_ = correction_lag_R_ = q_.toRotationMatrix();
   rest_rate_ = imu.angular_velocity;
   rest_force_ = imu.specific_force;
   calm_s_ = 0;
@@ -199,31 +207,58 @@ void MadgwickFilter::detect_rest(const Eigen::Vector3d& rate, const Eigen::Vecto
   const double memory = 1 / (2 * std::numbers::pi * options_.rest_bias_cutoff_hz);
   bias_ += dt / std::min(rest_total_s_, memory + dt) * (rest_rate_ - bias_);
   bias_known_ = true;
+  bias_variance_ = bias_variance_.cwiseMin(options_.rest_bias_sigma * options_.rest_bias_sigma);
+}
+
+void MadgwickFilter::update_motion_bias(const Eigen::Vector3d& tilt_rate, const Eigen::Matrix3d& R, double dt) {
+  // A gyroscope that reads too much by b makes the attitude turn by R b, and the correction turns back: late by the
+  // low-pass of the force and by its own time constant. The same two lags on R give the measurement's matrix:
+  // tilt_rate = -lagged(R) b + noise. (VQF filters R for the same reason: Laidig and Seel, 2023, section 3.4.)
+  force_lag_R_ += dt / (options_.accelerometer_time_constant_s + dt) * (R - force_lag_R_);
+  correction_lag_R_ += dt / (correction_time_s_ + dt) * (force_lag_R_ - correction_lag_R_);
+  if (elapsed_s_ < options_.start_time_s) return;
+  const double walk = options_.motion_bias_walk;
+  const double noise = options_.motion_bias_noise;
+  const auto H = correction_lag_R_.topRows<2>();
+  const Eigen::Vector3d gain = bias_variance_ / (noise * noise + dt * bias_variance_.maxCoeff());
+  bias_ -= dt * gain.cwiseProduct(H.transpose() * tilt_rate.head<2>());
+  bias_ = bias_.cwiseMax(-options_.max_gyroscope_bias).cwiseMin(options_.max_gyroscope_bias);
+  bias_known_ = true;
+  const Eigen::Vector3d seen = H.colwise().squaredNorm().transpose();
+  bias_variance_ +=
+      dt * (Eigen::Vector3d::Constant(walk * walk) - gain.cwiseProduct(bias_variance_).cwiseProduct(seen));
+}
+
+bool MadgwickFilter::agrees(const FieldMean& mean, const FieldMean& sample) const {
+  return std::abs(sample.norm - mean.norm) <= options_.magnetic_norm_tolerance * mean.norm &&
+         sample.cos_dip * mean.cos_dip + sample.sin_dip * mean.sin_dip >= cos_dip_tolerance_;
+}
+
+void MadgwickFilter::follow(FieldMean& mean, const FieldMean& sample, double dt) const {
+  // A mean at first, a low-pass later.
+  const double k = mean.norm == 0 ? 1 : dt / (std::min(mean.seen_s, options_.magnetic_reference_time_s) + dt);
+  mean.norm += k * (sample.norm - mean.norm);
+  mean.sin_dip += k * (sample.sin_dip - mean.sin_dip);
+  mean.cos_dip += k * (sample.cos_dip - mean.cos_dip);
+  mean.seen_s = std::min(mean.seen_s + dt, options_.magnetic_max_rejection_s);
 }
 
 bool MadgwickFilter::magnetic_field_disturbed(double sin_dip, double cos_dip, double dt) {
-  if (reference_norm_ == 0) {
-    reference_norm_ = field_norm_;
-    reference_sin_dip_ = sin_dip;
-    reference_cos_dip_ = cos_dip;
+  const FieldMean sample{field_norm_, sin_dip, cos_dip, 0};
+  if (elapsed_s_ < options_.accelerometer_time_constant_s)
+    reference_.seen_s = 0;  // the tilt is too uncertain for a mean
+  if (reference_.norm == 0 || elapsed_s_ < options_.start_time_s || agrees(reference_, sample)) {
+    follow(reference_, sample, dt);
+    rejected_s_ = std::max(0.0, rejected_s_ - dt);
     return false;
   }
-  const bool disturbed = std::abs(field_norm_ - reference_norm_) > options_.magnetic_norm_tolerance * reference_norm_ ||
-                         cos_dip * reference_cos_dip_ + sin_dip * reference_sin_dip_ < cos_dip_tolerance_;
-  if (disturbed) {
-    rejected_s_ += dt;
-    if (rejected_s_ < options_.magnetic_max_rejection_s) return true;
-    reference_norm_ = field_norm_;
-    reference_sin_dip_ = sin_dip;
-    reference_cos_dip_ = cos_dip;
-    rejected_s_ = 0;
-    return false;
-  }
-  rejected_s_ = std::max(0.0, rejected_s_ - dt);
-  const double k = dt / (options_.magnetic_reference_time_s + dt);
-  reference_norm_ += k * (field_norm_ - reference_norm_);
-  reference_sin_dip_ += k * (sin_dip - reference_sin_dip_);
-  reference_cos_dip_ += k * (cos_dip - reference_cos_dip_);
+  if (!agrees(candidate_, sample)) candidate_ = {};
+  follow(candidate_, sample, dt);
+  rejected_s_ += dt;
+  if (candidate_.seen_s < reference_.seen_s && rejected_s_ < options_.magnetic_max_rejection_s) return true;
+  reference_ = candidate_;
+  candidate_ = {};
+  rejected_s_ = 0;
   return false;
 }
 
@@ -251,6 +286,8 @@ void MadgwickFilter::turn_to_north() {
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitZ()));
   q_ = turn * q_;
   force_world_ = turn * force_world_;
+  force_lag_R_ = turn * force_lag_R_;
+  correction_lag_R_ = turn * correction_lag_R_;
   heading_known_ = true;
 }
 
@@ -374,12 +411,14 @@ std::uint32_t MadgwickFilter::update(const ImuMeasurement& imu) {
     Eigen::Vector3d v = weight / size * gradient;
     if (elapsed_s_ < options_.start_time_s && dt > 0) {
       elapsed_s_ += dt;
-      // The force is averaged already over its time constant; the mean over all that came goes on from there.
-      const double averaged = std::max(0.0, elapsed_s_ - options_.accelerometer_time_constant_s);
-      const double tilt_gain = std::max(weight / size, 0.5 * dt / (averaged + dt));
-      const double heading_gain = std::max(weight / size, 0.5 * dt / (elapsed_s_ + dt));
+      // While the force has not been averaged yet, attitude and heading follow what it and the field say now; then the
+      // mean over all that comes goes on from there.
+      const double gain = 0.5 * dt / (std::max(0.0, elapsed_s_ - options_.accelerometer_time_constant_s) + dt);
+      const double tilt_gain = std::max(weight / size, gain);
+      const double heading_gain = std::max(weight / size, gain / std::max(options_.magnetometer_weight, 0.1));
       v = {tilt_gain * gradient.x(), tilt_gain * gradient.y(), heading_gain * gradient.z()};
     }
+    if (options_.motion_bias && dt > 0) update_motion_bias(2 / dt * v, R, dt);
     // q + (0, v) * q
     q = Eigen::Quaterniond(
         q.w() - v.x() * q.x() - v.y() * q.y() - v.z() * q.z(), q.x() + v.x() * q.w() + v.y() * q.z() - v.z() * q.y(),

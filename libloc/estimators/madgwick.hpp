@@ -56,8 +56,9 @@ struct MadgwickOptions {
   /// Low-pass of the specific force in world axes, where acceleration averages out and gravity stays. 0: none. [s]
   double accelerometer_time_constant_s = 0;
 
-  /// For this long after the start the correction is at least a mean over all samples so far (gain 1/elapsed), because
-  /// a start in motion is far off and a small beta would take long to mend it. 0: none (the report). [s]
+  /// For this long after the start attitude and heading follow the averaged force and the field as a mean over all
+  /// samples so far (gain 1/elapsed), because a start in motion is far off and a small beta would take long to mend it;
+  /// no field is rejected until then. 0: none (the report). [s]
   double start_time_s = 0;
 
   /// Estimate the gyroscope's bias while at rest.
@@ -67,14 +68,22 @@ struct MadgwickOptions {
   double rest_min_duration_s = 1.5;          ///< Calm for this long is rest. [s]
   double rest_low_pass_s = 0.5;              ///< Time constant of these low-passes. [s]
   double rest_bias_cutoff_hz = 0.1;          ///< Low-pass of the rate that becomes the bias. [Hz]
-  double max_gyroscope_bias = 0.035;         ///< A larger low-passed rate is a slow turn, not a bias. [rad/s] (2 deg/s)
+  /// Estimate the bias in motion as well, from what the accelerometer keeps correcting: a Kalman filter whose
+  /// measurement is the rate of the tilt correction. The axis that is vertical just then is not observed.
+  bool motion_bias = false;
+  double motion_bias_start_sigma = 0.0087;  ///< Deviation of the bias at the start. [rad/s] (0.5 deg/s)
+  double motion_bias_walk = 1.75e-4;        ///< By which it walks. [rad/s/sqrt(s)] (0.1 deg/s in 100 s)
+  double motion_bias_noise = 0.0175;        ///< White noise of that measurement. [rad/s*sqrt(s)] (1 deg/s over 1 s)
+  double rest_bias_sigma = 5e-4;            ///< Deviation of the bias after a rest. [rad/s] (0.03 deg/s)
+  double max_gyroscope_bias = 0.035;        ///< A larger low-passed rate is a slow turn, not a bias. [rad/s] (2 deg/s)
 
-  /// Reject the magnetometer where norm or dip differ from a reference that is learnt while they do not.
+  /// Reject the magnetometer where norm or dip differ from a reference that is learnt while they do not. Another field
+  /// becomes the reference once it has been steady for as long as the reference had been seen.
   bool magnetic_rejection = false;
   double magnetic_norm_tolerance = 0.10;   ///< Relative to the reference.
   double magnetic_dip_tolerance = 0.1745;  ///< [rad] (10 deg)
   double magnetic_reference_time_s = 20;   ///< Time constant with which the reference follows. [s]
-  double magnetic_max_rejection_s = 60;    ///< After this long the field is taken for the new normal. [s]
+  double magnetic_max_rejection_s = 60;  ///< After this long the field is taken for the new normal, steady or not. [s]
 
   double max_gap_s = 1.0;               ///< A longer time between IMU samples starts the filter anew. [s]
   double max_magnetometer_age_s = 0.5;  ///< Until then a sample is used on, carried along by the gyroscope. [s]
@@ -136,9 +145,20 @@ class MadgwickFilter {
   const MadgwickOptions& options() const { return options_; }
 
  private:
+  // Norm and dip of a field, averaged, and for how long they were seen.
+  struct FieldMean {
+    double norm = 0;
+    double sin_dip = 0;
+    double cos_dip = 1;
+    double seen_s = 0;
+  };
+
   std::uint32_t skip(std::uint32_t reason);
   void start(const ImuMeasurement& imu);
   void detect_rest(const Eigen::Vector3d& rate, const Eigen::Vector3d& force, double dt);
+  void update_motion_bias(const Eigen::Vector3d& tilt_rate, const Eigen::Matrix3d& R, double dt);
+  bool agrees(const FieldMean& mean, const FieldMean& sample) const;
+  void follow(FieldMean& mean, const FieldMean& sample, double dt) const;
   bool magnetic_field_disturbed(double sin_dip, double cos_dip, double dt);
   bool carry_field(double dt);
   void turn_to_north();
@@ -150,6 +170,7 @@ class MadgwickFilter {
   double up_z_ = 1;
   int north_axis_ = 1;
   double cos_dip_tolerance_ = 1;
+  double correction_time_s_ = 0;  // of a small error
 
   // What is known now.
   Eigen::Quaterniond q_{1, 0, 0, 0};
@@ -172,16 +193,20 @@ class MadgwickFilter {
   TimeNs field_judged_time_ = kNoTime;  // of the last sample that was compared with the reference
   bool field_disturbed_ = false;
 
+  // Bias in motion: R behind the lags of the correction.
+  Eigen::Matrix3d force_lag_R_ = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d correction_lag_R_ = Eigen::Matrix3d::Identity();
+
   // Rest.
   Eigen::Vector3d rest_rate_ = Eigen::Vector3d::Zero();   // low-passed
   Eigen::Vector3d rest_force_ = Eigen::Vector3d::Zero();  // low-passed
   double calm_s_ = 0;
-  double rest_total_s_ = 0;  // of all rest so far
+  Eigen::Vector3d bias_variance_ = Eigen::Vector3d::Zero();  // of bias_, by axis
+  double rest_total_s_ = 0;                                  // of all rest so far
 
-  // Magnetic reference.
-  double reference_norm_ = 0;
-  double reference_sin_dip_ = 0;
-  double reference_cos_dip_ = 1;
+  // Magnetic rejection.
+  FieldMean reference_;
+  FieldMean candidate_;  // of what is being rejected
   double rejected_s_ = 0;
 
   MadgwickCounts counts_;
