@@ -77,7 +77,7 @@ AlignmentFailure solve_yaw(const Eigen::Matrix3d& covariance, double size, Align
 AlignmentFailure solve_umeyama(const Eigen::Matrix3d& covariance, const PointSet& estimate, double size,
                                bool with_scale, Alignment& result) {
   const Svd svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);  // equation 38
-  const Eigen::Vector3d d = svd.singularValues();
+  const Eigen::Vector3d& d = svd.singularValues();
   // Equation 43: the smallest axis is turned over where U V^T would be a reflection.
   const double sign = svd.matrixU().determinant() * svd.matrixV().determinant() < 0 ? -1 : 1;
   // The rotation is unique when turning over two more axes costs something.
