@@ -155,7 +155,7 @@ void write_kalibr_camchain(const std::filesystem::path& path, const Rig& rig) {
         << "\n";
     write_numbers(out, "  ", "intrinsics", to_vector(camera.intrinsics_px));
     out << "  resolution: [" << camera.width_px << ", " << camera.height_px << "]\n";
-    out << "  rostopic: /" << camera.name << "/image_raw\n";
+    out << "  rostopic: /cam" << i << "/image_raw\n";
     write_number(out, "  timeshift_cam_imu", camera.time_offset_s);
   }
   file.commit();

@@ -63,7 +63,8 @@ std::vector<CameraCalibration> read_kalibr_camchain(const std::filesystem::path&
 /// stay at their defaults, because the file does not have them.
 ImuCalibration read_kalibr_imu(const std::filesystem::path& path);
 
-/// For Kalibr's tools. @throws as write_rig; std::invalid_argument when the rig has no camera (no IMU).
+/// For Kalibr's tools; cameras become cam0, cam1, …. @throws as write_rig; std::invalid_argument when the rig has no
+/// camera (no IMU).
 void write_kalibr_camchain(const std::filesystem::path& path, const Rig& rig);
 void write_kalibr_imu(const std::filesystem::path& path, const Rig& rig);
 

@@ -1,11 +1,10 @@
 // BROAD trials: units, times, absent variables, cut files.
-#include "libloc/io/broad.hpp"
-
 #include <gtest/gtest.h>
 #include <matio.h>
 
 #include <cmath>
 
+#include "libloc/io/broad.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/sources.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -22,7 +21,7 @@ using test::read_all;
 struct Trial {
   std::size_t rows = 4;
   double rate = 285.714285714;
-  std::string leave_out;
+  std::string leave_out = {};
   std::size_t short_columns = 0;  // of imu_acc
   bool compressed = false;
 };
@@ -51,7 +50,8 @@ std::filesystem::path write_trial(const std::filesystem::path& path, const Trial
     std::vector<std::uint8_t> flags(t.rows);
     for (std::size_t i = 0; i < t.rows; ++i) flags[i] = i % 2;
     std::array<std::size_t, 2> dims{t.rows, 1};
-    matvar_t* variable = Mat_VarCreate("movement", MAT_C_UINT8, MAT_T_UINT8, 2, dims.data(), flags.data(), MAT_F_LOGICAL);
+    matvar_t* variable =
+        Mat_VarCreate("movement", MAT_C_UINT8, MAT_T_UINT8, 2, dims.data(), flags.data(), MAT_F_LOGICAL);
     Mat_VarWrite(file, variable, MAT_COMPRESSION_NONE);
     Mat_VarFree(variable);
   }
@@ -117,7 +117,8 @@ TEST_F(Broad, cut_at_any_byte_is_refused) {
   for (const bool compressed : {false, true}) {
     const std::string text = test::read_file(write({.compressed = compressed}));
     for (std::size_t size = 0; size < text.size(); ++size) {
-      EXPECT_THROW(read_broad_trial(folder_.write("cut.mat", std::string_view(text).substr(0, size))), DataError) << size;
+      EXPECT_THROW(read_broad_trial(folder_.write("cut.mat", std::string_view(text).substr(0, size))), DataError)
+          << size;
     }
   }
 }

@@ -1,11 +1,10 @@
 // Recordings as comma-separated text: headings, units, damage.
-#include "libloc/io/csv.hpp"
-
 #include <gtest/gtest.h>
 
 #include <clocale>
 #include <numbers>
 
+#include "libloc/io/csv.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/sources.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -87,15 +86,19 @@ TEST_F(Csv, reads_the_heading_of_euroc) {
 TEST_F(Csv, columns_without_unit_need_the_options) {
   const std::string text = "#ts,wx,wy,wz,ax,ay,az\n5,1,2,3,4,5,6\n";
   expect_error(text, {"a.csv:1", "'ts'", "ns, us, ms, s"});
-  CsvOptions options{.time_unit = "ns", .angular_velocity_unit = "rad/s", .specific_force_unit = "m/s^2"};
+  CsvOptions options;
+  options.time_unit = "ns";
+  options.angular_velocity_unit = "rad/s";
+  options.specific_force_unit = "m/s^2";
   EXPECT_EQ(read(text, options).size(), 1U);
   options.specific_force_unit = "furlong";
   expect_error(text, {"'ax'", "furlong", "m/s^2"}, options);
 }
 
 TEST_F(Csv, magnetometer_at_its_own_rate_has_empty_cells) {
-  const auto all = read("time_s,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2,mx_ut,my_ut,mz_ut\n"
-                        "0,1,2,3,4,5,6,,,\n0.01,1,2,3,4,5,6,10,20,30\n0.02,,,,,,,10,20,30\n");
+  const auto all = read(
+      "time_s,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2,mx_ut,my_ut,mz_ut\n"
+      "0,1,2,3,4,5,6,,,\n0.01,1,2,3,4,5,6,10,20,30\n0.02,,,,,,,10,20,30\n");
   ASSERT_EQ(only<ImuMeasurement>(all).size(), 2U);
   ASSERT_EQ(only<MagnetometerMeasurement>(all).size(), 2U);
   EXPECT_TRUE(std::holds_alternative<MagnetometerMeasurement>(all.at(1))) << "before the IMU sample of the same time";
@@ -116,7 +119,8 @@ TEST_F(Csv, reads_a_reference) {
 }
 
 TEST_F(Csv, bad_headings_are_told) {
-  expect_error("time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,temperature\n", {"a.csv:1", "temperature", "known are"});
+  expect_error("time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,temperature\n",
+               {"a.csv:1", "temperature", "known are"});
   expect_error("time_ns,wx_rpm,wy_rad_s\n", {"wx_rpm", "rpm", "deg/s"});
   expect_error("time_ns,px,py\n1,2,3\n", {"2 of 3"});
   expect_error("time_ns,px,py,pz,px\n", {"twice"});
@@ -216,8 +220,11 @@ TEST_F(Csv, the_locale_does_not_matter) {
 
 TEST_F(Csv, reads_a_real_calibration_recording) {
   LOC_DATA_OR_SKIP(file, "euroc-cam-imu-calibration/imu0.csv");
-  const auto source =
-      open_csv(file, {.time_unit = "ns", .angular_velocity_unit = "rad/s", .specific_force_unit = "m/s^2"});
+  CsvOptions options;
+  options.time_unit = "ns";
+  options.angular_velocity_unit = "rad/s";
+  options.specific_force_unit = "m/s^2";
+  const auto source = open_csv(file, options);
   const auto imu = only<ImuMeasurement>(read_all(*source));
   ASSERT_GT(imu.size(), 14000U);
   EXPECT_EQ(imu[0].time_ns, 1404733405747800064);

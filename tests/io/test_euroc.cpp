@@ -1,10 +1,9 @@
 // EuRoC folders: files merged in time order, absent ones, damage.
-#include "libloc/io/euroc.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
+#include "libloc/io/euroc.hpp"
 #include "tests/support/sources.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -65,7 +64,8 @@ TEST_F(Euroc, reads_a_magnetometer) {
   folder_.write("r/mav0/mag0/data.csv", "#timestamp [ns],mx [uT],my [uT],mz [uT]\n1403715273267143168,20,0,-40\n");
   const auto all = read_all(*open_euroc(recording()));
   ASSERT_EQ(all.size(), 5U);
-  EXPECT_TRUE((std::get<MagnetometerMeasurement>(all[1]).magnetic_field - Eigen::Vector3d(2e-5, 0, -4e-5)).norm() < 1e-18);
+  EXPECT_TRUE((std::get<MagnetometerMeasurement>(all[1]).magnetic_field - Eigen::Vector3d(2e-5, 0, -4e-5)).norm() <
+              1e-18);
 }
 
 TEST_F(Euroc, what_is_missing_or_wrong_is_told) {

@@ -1,9 +1,8 @@
 // TUM trajectories: order of the quaternion, exact times, damage.
-#include "libloc/io/tum.hpp"
-
 #include <gtest/gtest.h>
 
 #include "libloc/core/random.hpp"
+#include "libloc/io/tum.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/sources.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -35,7 +34,8 @@ TEST_F(Tum, the_quaternion_is_x_y_z_w) {
 TEST_F(Tum, what_is_written_is_read_to_the_last_bit) {
   Random random(3);
   std::vector<StampedPose> poses;
-  for (int i = 0; i < 50; ++i) poses.push_back({1403715274302142975 + i * 5'000'001LL, {random.rotation(), random.normal3()}});
+  for (int i = 0; i < 50; ++i)
+    poses.push_back({1403715274302142975 + i * 5'000'001LL, {random.rotation(), random.normal3()}});
   const auto path = folder_.path() / "b.tum";
   write_tum(path, poses);
   const auto back = read_tum(path).poses;

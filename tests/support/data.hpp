@@ -1,5 +1,5 @@
-// Where the real recordings are: $LIBLOC_DATA, or shared/data beside the project's folder. Tests that need them skip with
-// a message when they are absent.
+// Where the real recordings are: $LIBLOC_DATA, or shared/data beside the project's folder. Tests that need them skip
+// with a message when they are absent.
 #pragma once
 
 #include <cstdlib>
@@ -14,10 +14,10 @@ inline std::filesystem::path data_folder() {
 
 }  // namespace loc::test
 
-/// In a test: gives `path` in the data folder, or skips the test.
-#define LOC_DATA_OR_SKIP(variable, path)                                            \
-  const std::filesystem::path variable = loc::test::data_folder() / (path);         \
-  if (!std::filesystem::exists(variable)) {                                         \
-    GTEST_SKIP() << variable.string() << " is absent; LIBLOC_DATA names the folder"; \
-  }                                                                                 \
+/// In a test: gives the path of name_in_folder, or skips the test.
+#define LOC_DATA_OR_SKIP(variable, name_in_folder)                                    \
+  const std::filesystem::path variable = loc::test::data_folder() / (name_in_folder); \
+  if (!std::filesystem::exists(variable)) {                                           \
+    GTEST_SKIP() << variable.string() << " is absent; LIBLOC_DATA names the folder";  \
+  }                                                                                   \
   static_assert(true)
