@@ -9,7 +9,7 @@
 namespace loc::io {
 namespace {
 
-constexpr std::size_t kLongestLine = 64 * 1024;
+constexpr std::size_t kLongestLine = 65536;
 
 }  // namespace
 

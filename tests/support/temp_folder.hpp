@@ -31,6 +31,8 @@ class TempFolder {
   std::filesystem::path write(const std::filesystem::path& name, std::string_view text) const {
     const auto file = path_ / name;
     std::filesystem::create_directories(file.parent_path());
+    // Some file systems wait for the disk when a file is truncated and written anew, not when it is a new one.
+    std::filesystem::remove(file);
     std::ofstream(file, std::ios::binary).write(text.data(), static_cast<std::streamsize>(text.size()));
     return file;
   }
