@@ -45,7 +45,7 @@ int main(int argc, char** argv) {
   std::int64_t greeting_timeout_ms = options.greeting_timeout.count();
   std::string config;
   loc::Program program("loc-hub", "Hands LCM messages on between programs whose --lcm-url is tcpq://ADDRESS:PORT.");
-  program.add_config(config);
+  program.add_config(config)->description("Taken like by all programs; the hub needs nothing of it");
   program.app()
       .add_option("--bind", options.bind_address, "IPv4 address to listen at; 0.0.0.0 serves other hosts too")
       ->capture_default_str();

@@ -71,8 +71,8 @@ void Program::add_lcm_url(std::string& url) {
       ->capture_default_str();
 }
 
-void Program::add_config(std::string& path) {
-  app_.add_option("--config,--rig", path, "Calibration of the sensors (rig.yaml)")->check(CLI::ExistingFile);
+CLI::Option* Program::add_config(std::string& path) {
+  return app_.add_option("--config,--rig", path, "Calibration of the sensors (rig.yaml)")->check(CLI::ExistingFile);
 }
 
 int Program::run(int argc, char** argv, const std::function<int()>& body) {

@@ -34,7 +34,7 @@ class Program {
   /// Adds --lcm-url, preset with the default transport.
   void add_lcm_url(std::string& url);
   /// Adds --config, also under the name --rig.
-  void add_config(std::string& path);
+  CLI::Option* add_config(std::string& path);
 
   /// Parses, runs body and turns what it throws into a log line and an exit code.
   int run(int argc, char** argv, const std::function<int()>& body);

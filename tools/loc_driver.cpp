@@ -1,0 +1,93 @@
+// loc-driver: a recording (later also sensors) onto LCM, as if it happened now.
+#include <spdlog/spdlog.h>
+
+#include <cmath>
+
+#include "tools/support/channels.hpp"
+#include "tools/support/driver.hpp"
+#include "tools/support/open_source.hpp"
+#include "tools/support/program.hpp"
+#include "tools/support/rig_option.hpp"
+
+namespace {
+
+// "max" or a positive number; 0 stands for max.
+double parse_speed(const std::string& text) {
+  if (text == "max") return 0;
+  double speed = 0;
+  if (!CLI::detail::lexical_cast(text, speed) || !std::isfinite(speed) || speed <= 0) {
+    throw loc::UsageError("--speed '" + text + "': must be a positive number or max");
+  }
+  return speed;
+}
+
+void add_sources(CLI::App& app, loc::SourceSpec& spec) {
+  const auto add = [&](const char* kind, const char* argument, const char* text) {
+    CLI::App* source = app.add_subcommand(kind, text);
+    source->add_option(argument, spec.path)->required();
+    source->fallthrough();
+    source->callback([&spec, kind] { spec.kind = kind; });
+    return source;
+  };
+  add("euroc", "DIR", "EuRoC / ASL recording: IMU, magnetometer, reference");
+  add("lcm-log", "FILE", "LCM log: types of package loc and of ASPN-23");
+  add("broad", "FILE", "Trial of the BROAD benchmark (*.mat)");
+  CLI::App* csv = add("csv", "FILE", "Comma-separated samples, names and units in the first line");
+  csv->add_option("--time-unit", spec.csv.time_unit, "ns, us, ms, s; where the heading has none");
+  csv->add_option("--angular-velocity-unit", spec.csv.angular_velocity_unit, "rad/s or deg/s; likewise");
+  csv->add_option("--specific-force-unit", spec.csv.specific_force_unit, "m/s^2, g, mg; likewise");
+  csv->add_option("--magnetic-field-unit", spec.csv.magnetic_field_unit, "T, mT, uT, nT, gauss, mgauss, arb; likewise");
+  csv->add_option("--tesla-per-unit", spec.csv.tesla_per_unit, "What one arb is");
+  app.require_subcommand(1);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  loc::DriverOptions options;
+  loc::SourceSpec source;
+  std::string speed = "1";
+  std::string config;
+  std::vector<std::string> channels;
+  double wait_for_estimator = 0;
+  loc::Program program("loc-driver", "Publishes a recording on LCM, paced by its time stamps.");
+  CLI::App& app = program.app();
+  options.lcm_url.clear();
+  program.add_lcm_url(options.lcm_url);
+  program.add_config(config)->description("Calibration (rig.yaml): checked here, applied by the estimator");
+  add_sources(app, source);
+  app.add_option("--speed", speed, "1 as recorded, N times as fast, or max: as fast as the estimator takes it")
+      ->capture_default_str();
+  app.add_option("--start", options.start_s, "Leave out the first seconds of the recording")->capture_default_str();
+  app.add_option("--duration", options.duration_s, "Seconds of the recording to play, 0: all")->capture_default_str();
+  CLI::Option* wait = app.add_option("--wait-for-estimator", wait_for_estimator,
+                                     "Seconds to wait for an estimator before the first sample");
+  app.add_option("--window", options.window, "With --speed max: IMU samples on their way at a time")
+      ->capture_default_str();
+  app.add_option("--answer-timeout", options.answer_timeout_s,
+                 "With --speed max: seconds of silence after which the estimator counts as gone")
+      ->capture_default_str();
+  app.add_option("--reconnect-timeout", options.reconnect_timeout_s, "Seconds without hub after which it gives up")
+      ->capture_default_str();
+  loc::add_channel_option(app, channels);
+  app.add_flag("--statistics", options.statistics, "Log and publish counters once per second");
+
+  return program.run(argc, argv, [&] {
+    options.speed = parse_speed(speed);
+    options.channels = loc::parse_channels(channels);
+    source.decode.channels = {};
+    options.source_name = source.kind + " " + source.path;
+    if (wait->count() > 0) options.wait_for_estimator_s = wait_for_estimator;
+    if (!config.empty()) loc::load_rig(config);
+    loc::Driver driver(options, loc::open_source(source));
+    spdlog::info("event=started source=\"{}\" speed={} url={}", options.source_name, speed, options.lcm_url);
+    try {
+      driver.run();
+    } catch (...) {
+      spdlog::error("event=not_completed {}", loc::format_counts(driver.counts()));
+      throw;
+    }
+    spdlog::info("event=ended interrupted={} {}", loc::stop_requested(), loc::format_counts(driver.counts()));
+    return loc::kExitOk;
+  });
+}

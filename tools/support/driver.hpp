@@ -1,0 +1,73 @@
+// Publishes what a source gives: paced by its time stamps, or as fast as the estimator takes it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "libloc/io/source.hpp"
+#include "loc/source_status_t.hpp"
+#include "tools/support/flow_control.hpp"
+#include "tools/support/lcm_link.hpp"
+#include "tools/support/pacer.hpp"
+
+namespace loc {
+
+struct DriverOptions {
+  std::string lcm_url = kDefaultLcmUrl;
+  std::string source_name;                         ///< as the user named it
+  std::array<std::string, kStreamKinds> channels;  ///< empty: default_channel()
+  double speed = 1;                                ///< 0: as fast as the estimator takes it
+  double start_s = 0;                              ///< of the recording, from its first sample
+  double duration_s = 0;                           ///< 0: to the end
+  std::int64_t window = 256;                       ///< IMU samples on their way, when speed is 0
+  double answer_timeout_s = 10;                    ///< longest silence of the estimator, when speed is 0
+  double reconnect_timeout_s = 10;                 ///< longest time without a hub
+  std::optional<double> wait_for_estimator_s;      ///< before the first sample
+  bool statistics = false;
+
+  /// @throws std::invalid_argument naming the field and its value.
+  void check() const;
+};
+
+class Driver {
+ public:
+  /// @throws as DriverOptions::check and open_lcm.
+  Driver(DriverOptions options, std::unique_ptr<MeasurementSource> source);
+
+  /// Until the end of the source or until asked to stop. The last source_status_t says how it ended.
+  /// @throws DataError when the source cannot be read on; std::runtime_error when no estimator answers or the
+  /// connection stays lost.
+  void run();
+  NamedCounts counts() const;
+
+ private:
+  void publish_all();
+  void wait_for_estimator();
+  void wait_for_window();
+  void wait_until_taken();
+  void poll_answers(int timeout_ms);
+  void publish_measurement(Measurement& measurement);
+  template <class Message>
+  void send(const std::string& channel, const Message& message);
+  void publish_status(std::int8_t state, const std::string& text);
+  void report_each_second();
+
+  DriverOptions options_;
+  std::unique_ptr<MeasurementSource> source_;
+  LcmPublisher publisher_;
+  std::optional<LcmReceiver> receiver_;
+  Pacer pacer_;
+  FlowControl flow_;
+  std::map<std::pair<StreamKind, int>, std::int64_t> next_sequence_;
+  std::array<std::int64_t, kStreamKinds> published_{};
+  std::int64_t left_out_ = 0;  // before start
+  TimeNs next_report_ns_ = 0;
+  TimeNs window_wait_ns_ = 0;
+};
+
+}  // namespace loc

@@ -1,0 +1,36 @@
+// Lets a recording run at the pace of its time stamps, or a multiple of it.
+#pragma once
+
+#include <cstdint>
+
+#include "libloc/core/time.hpp"
+
+namespace loc {
+
+class Pacer {
+ public:
+  /// @param speed 1: as recorded; N: N times as fast; 0: does not wait at all
+  /// @throws std::invalid_argument unless finite and not negative
+  explicit Pacer(double speed);
+
+  /// Time [ns] to wait at now (monotonic) before the sample of that time is due; 0 when it is due or late. Where the
+  /// recording's clock steps back, or on by more than kMaxStepNs, it takes up the pace anew from there.
+  TimeNs wait_ns(TimeNs sample_time_ns, TimeNs now_ns);
+
+  std::int64_t restarts() const { return restarts_; }
+  /// Most that a sample was late so far.
+  TimeNs max_lag_ns() const { return max_lag_ns_; }
+
+  static constexpr TimeNs kMaxStepNs = 10'000'000'000;
+
+ private:
+  double speed_;
+  bool started_ = false;
+  TimeNs origin_sample_ns_ = 0;
+  TimeNs origin_now_ns_ = 0;
+  TimeNs last_sample_ns_ = 0;
+  std::int64_t restarts_ = 0;
+  TimeNs max_lag_ns_ = 0;
+};
+
+}  // namespace loc
