@@ -1,0 +1,114 @@
+// loc-estimator: measurements in, estimates out; on LCM, or off line from a recording to a file, through the same code.
+#include <spdlog/spdlog.h>
+
+#include "tools/support/any_estimator.hpp"
+#include "tools/support/channels.hpp"
+#include "tools/support/estimate_output.hpp"
+#include "tools/support/live_estimator.hpp"
+#include "tools/support/open_source.hpp"
+#include "tools/support/pipeline.hpp"
+#include "tools/support/program.hpp"
+#include "tools/support/rig_option.hpp"
+
+namespace {
+
+struct Arguments {
+  loc::LiveEstimatorOptions live;
+  std::vector<std::string> channels;
+  std::string config;
+  std::string method = "madgwick";
+  std::string preset = "robust";
+  std::string world = "ENU";
+  double beta = 0;
+  bool no_magnetometer = false;
+  double reorder_delay_ms = 50;
+  loc::SourceSpec input;
+  std::string output;
+};
+
+loc::EstimatorSettings settings_of(const Arguments& arguments, bool beta_given) {
+  loc::EstimatorSettings settings;
+  settings.method = arguments.method;
+  settings.use_magnetometer = !arguments.no_magnetometer;
+  settings.madgwick = loc::MadgwickOptions::preset(arguments.preset);
+  if (beta_given) settings.madgwick.beta = arguments.beta;
+  settings.madgwick.world = loc::parse_world_frame(arguments.world);
+  return settings;
+}
+
+int run_offline(const Arguments& arguments, loc::AnyEstimator estimator) {
+  loc::SourceSpec input = arguments.input;
+  if (input.kind.empty()) input.kind = loc::guess_source_kind(input.path);
+  input.decode.channels = arguments.live.channels;
+  const auto source = loc::open_source(input);
+  const auto output = loc::open_estimate_output(arguments.output, estimator.method(), estimator.world());
+  loc::EstimatorPipeline pipeline(std::move(estimator), loc::load_rig(arguments.config), arguments.live.merger,
+                                  [&](const loc::Estimate& estimate) { output->write(estimate); });
+  while (auto measurement = source->next()) {
+    if (loc::stop_requested()) break;
+    pipeline.push(std::move(*measurement));
+  }
+  pipeline.end();
+  output->finish();
+  spdlog::info("event=ended interrupted={} source=\"{}\" {} {}", loc::stop_requested(), input.path,
+               loc::format_counts(source->counts()), loc::format_counts(pipeline.counts()));
+  return loc::stop_requested() ? loc::kExitFailed : loc::kExitOk;
+}
+
+int run_live(const Arguments& arguments, loc::AnyEstimator estimator) {
+  loc::LiveEstimator live(arguments.live, std::move(estimator), loc::load_rig(arguments.config));
+  spdlog::info("event=started method={} preset={} world={} url={}", arguments.method, arguments.preset, arguments.world,
+               arguments.live.lcm_url);
+  live.run();
+  spdlog::info("event=ended {} {}", loc::format_counts(live.counts()), loc::format_latency("latency", live.latency()));
+  return loc::kExitOk;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Arguments arguments;
+  loc::Program program("loc-estimator", "Estimates orientation from the measurements on LCM, or in a recording.");
+  CLI::App& app = program.app();
+  arguments.live.lcm_url.clear();
+  program.add_lcm_url(arguments.live.lcm_url);
+  program.add_config(arguments.config)->description("Calibration (rig.yaml) that is applied to the measurements");
+  app.add_option("--method", arguments.method, "Estimator")
+      ->check(CLI::IsMember(loc::estimator_methods()))
+      ->capture_default_str();
+  app.add_option("--preset", arguments.preset, "madgwick: report (the plain form), robust (for real sensors)")
+      ->check(CLI::IsMember({"report", "robust"}))
+      ->capture_default_str();
+  CLI::Option* beta = app.add_option("--beta", arguments.beta, "madgwick: gain [rad/s] in place of the preset's");
+  app.add_option("--world", arguments.world, "Axes of world: ENU, NWU, NED")
+      ->check(CLI::IsMember({"ENU", "NWU", "NED"}, CLI::ignore_case))
+      ->capture_default_str();
+  app.add_flag("--no-magnetometer", arguments.no_magnetometer, "Heading from the gyroscope alone");
+  loc::add_channel_option(app, arguments.channels);
+  app.add_option("--estimate-channel", arguments.live.estimate_channel, "Channel of the estimates")
+      ->capture_default_str();
+  app.add_option("--reorder-delay-ms", arguments.reorder_delay_ms,
+                 "Longest wait of one stream for another, in measurement time")
+      ->check(CLI::Range(0.0, 10'000.0))
+      ->capture_default_str();
+  app.add_option("--queue-capacity", arguments.live.queue_capacity, "Messages of one stream that may wait")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
+  app.add_flag("--exit-at-end", arguments.live.exit_at_end, "End when the source says that it has ended");
+  app.add_flag("--statistics", arguments.live.statistics, "Log and publish counters once per second");
+  CLI::Option* input = app.add_option("--input", arguments.input.path, "Off line: the recording to read");
+  app.add_option("--input-kind", arguments.input.kind, "euroc, lcm-log, csv, broad; otherwise by its looks")
+      ->check(CLI::IsMember({"euroc", "lcm-log", "csv", "broad"}))
+      ->needs(input);
+  CLI::Option* output =
+      app.add_option("--output", arguments.output, "Off line: *.csv, *.tum, or an LCM log")->needs(input);
+  input->needs(output);
+
+  return program.run(argc, argv, [&] {
+    arguments.live.channels = loc::parse_channels(arguments.channels);
+    arguments.live.merger.max_delay_ns = loc::from_seconds(arguments.reorder_delay_ms * 1e-3);
+    loc::AnyEstimator estimator = loc::make_estimator(settings_of(arguments, beta->count() > 0));
+    return input->count() > 0 ? run_offline(arguments, std::move(estimator))
+                              : run_live(arguments, std::move(estimator));
+  });
+}

@@ -1,0 +1,87 @@
+#include "tools/support/estimate_output.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <filesystem>
+#include <utility>
+#include <vector>
+
+#include "libloc/io/csv.hpp"
+#include "libloc/io/lcm_log.hpp"
+#include "libloc/io/tum.hpp"
+#include "msgs/convert.hpp"
+
+namespace loc {
+namespace {
+
+class CsvOutput : public EstimateOutput {
+ public:
+  explicit CsvOutput(const std::string& path) : writer_(path) {}
+  void write(const Estimate& estimate) override { writer_.write(estimate); }
+  void finish() override { writer_.flush(); }
+
+ private:
+  CsvWriter writer_;
+};
+
+class TumOutput : public EstimateOutput {
+ public:
+  explicit TumOutput(std::string path) : path_(std::move(path)) {}
+  void write(const Estimate& estimate) override {
+    if ((estimate.valid & kValidOrientation) == 0) {
+      ++without_orientation_;
+      return;
+    }
+    const bool position = (estimate.valid & kValidPosition) != 0;
+    if (!position) ++without_position_;
+    poses_.push_back({estimate.time_ns,
+                      Pose3(estimate.q_world_body, position ? estimate.position : Eigen::Vector3d::Zero().eval())});
+  }
+  void finish() override {
+    if (without_position_ > 0) {
+      spdlog::warn("event=no_position file=\"{}\" poses={} effect=\"the position column holds 0\"", path_,
+                   without_position_);
+    }
+    if (without_orientation_ > 0) {
+      spdlog::warn("event=left_out file=\"{}\" estimates_without_orientation={}", path_, without_orientation_);
+    }
+    write_tum(path_, poses_);
+  }
+
+ private:
+  std::string path_;
+  std::vector<StampedPose> poses_;
+  std::int64_t without_position_ = 0;
+  std::int64_t without_orientation_ = 0;
+};
+
+class LogOutput : public EstimateOutput {
+ public:
+  LogOutput(const std::string& path, std::string method, std::string world)
+      : writer_(path), method_(std::move(method)), world_(std::move(world)) {}
+  void write(const Estimate& estimate) override {
+    const estimate_t message = to_message(estimate, method_, world_);
+    bytes_.resize(static_cast<std::size_t>(message.getEncodedSize()));
+    message.encode(bytes_.data(), 0, static_cast<int>(bytes_.size()));
+    writer_.write(estimate.time_ns / 1000, kEstimateChannel, bytes_);
+  }
+  void finish() override { writer_.flush(); }
+
+ private:
+  LcmLogWriter writer_;
+  std::string method_;
+  std::string world_;
+  std::vector<std::uint8_t> bytes_;
+};
+
+}  // namespace
+
+std::unique_ptr<EstimateOutput> open_estimate_output(const std::string& path, const std::string& method,
+                                                     const std::string& world) {
+  const std::string extension = std::filesystem::path(path).extension();
+  if (extension == ".csv") return std::make_unique<CsvOutput>(path);
+  if (extension == ".tum" || extension == ".txt") return std::make_unique<TumOutput>(path);
+  return std::make_unique<LogOutput>(path, method, world);
+}
+
+}  // namespace loc

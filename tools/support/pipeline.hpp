@@ -1,0 +1,72 @@
+// From measurements in order of arrival to estimates: sequence check, calibration, merging in time order, estimator.
+// Live and off line run through this same class, which knows no files and no sockets: what differs is only who pushes
+// and who takes the estimates.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <utility>
+
+#include "libloc/core/named_count.hpp"
+#include "libloc/sensors/rig.hpp"
+#include "libloc/sensors/stream.hpp"
+#include "tools/support/any_estimator.hpp"
+
+namespace loc {
+
+/// Finds losses: a jump of the sequence number of a stream (of each camera its own).
+class SequenceCheck {
+ public:
+  struct Counts {
+    std::int64_t received = 0;
+    std::int64_t lost = 0;      ///< numbers that never came
+    std::int64_t repeated = 0;  ///< the same number twice in a row
+    std::int64_t restarts = 0;  ///< numbers went back: the source was started anew
+  };
+  void see(const Measurement& measurement);
+  const Counts& counts(StreamKind kind) const { return counts_[static_cast<std::size_t>(kind)]; }
+  /// Sequence number of the last sample of this kind; -1 before the first.
+  std::int64_t last(StreamKind kind) const { return last_of_kind_[static_cast<std::size_t>(kind)]; }
+
+ private:
+  std::array<Counts, kStreamKinds> counts_{};
+  std::array<std::int64_t, kStreamKinds> last_of_kind_ = {-1, -1, -1, -1, -1};
+  std::map<std::pair<StreamKind, int>, std::int64_t> last_;
+};
+
+class EstimatorPipeline {
+ public:
+  using Sink = std::function<void(const Estimate&)>;
+
+  /// @throws std::invalid_argument when the rig or the merger's options are wrong.
+  EstimatorPipeline(AnyEstimator estimator, Rig rig, const StreamMergerOptions& merger, Sink sink);
+
+  /// Takes the next sample as it arrives. Streams that the estimator does not take are left aside.
+  void push(Measurement measurement);
+  /// End of the recording: what waits goes to the estimator. The next sample starts another recording.
+  void end();
+
+  const AnyEstimator& estimator() const { return estimator_; }
+  const SequenceCheck& sequences() const { return sequences_; }
+  std::int64_t estimates() const { return estimates_; }
+  /// Received, lost, late and so on for each stream that the estimator takes, and the estimator's own counts.
+  NamedCounts counts() const;
+
+ private:
+  void drain();
+  void process(const Measurement& measurement);
+
+  AnyEstimator estimator_;
+  Rig rig_;
+  StreamMergerOptions merger_options_;
+  StreamMerger merger_;
+  StreamMergerCounts earlier_;  // of the recordings before this one
+  SequenceCheck sequences_;
+  Sink sink_;
+  bool ended_ = false;
+  std::int64_t estimates_ = 0;
+};
+
+}  // namespace loc
