@@ -185,7 +185,7 @@ void Hub::accept_clients() {
     const std::uint64_t id = next_id_++;
     auto client = std::make_unique<Client>(id, std::move(socket), std::move(peer), options_.limits);
     watch(epoll_.get(), EPOLL_CTL_ADD, client->socket.get(), EPOLLIN, id);
-    if (may_log()) spdlog::info("event=client_connected client={} peer={}", id, client->peer);
+    if (may_log()) spdlog::debug("event=client_connected client={} peer={}", id, client->peer);
     clients_.emplace(id, std::move(client));
     ++counts_.accepted;
   }
@@ -388,7 +388,7 @@ void Hub::condemn(Client& client, const std::string& reason, std::int64_t* count
   dead_.push_back(client.id);
   if (counter != nullptr) ++*counter;
   if (!may_log()) return;
-  const auto level = counter != nullptr || client.dropped > 0 ? spdlog::level::warn : spdlog::level::info;
+  const auto level = counter != nullptr || client.dropped > 0 ? spdlog::level::warn : spdlog::level::debug;
   spdlog::log(level, "event=client_closed client={} peer={} dropped={} reason=\"{}\"", client.id, client.peer,
               client.dropped, reason);
 }

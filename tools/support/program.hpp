@@ -31,6 +31,7 @@ class Program {
 
   CLI::App& app() { return app_; }
   const std::string& name() const { return name_; }
+  const std::string& log_level() const { return log_level_; }
   /// Adds --lcm-url, preset with the default transport.
   void add_lcm_url(std::string& url);
   /// Adds --config, also under the name --rig.
