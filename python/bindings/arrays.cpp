@@ -52,6 +52,11 @@ std::span<const double> values_view(const FloatArray& object, const char* name) 
   return {static_cast<const double*>(array.data()), static_cast<std::size_t>(array.size())};
 }
 
+std::span<const std::uint8_t> mask_view(const BoolArray& object, const char* name) {
+  const py::array array = flat_array(object, name, py::dtype::of<bool>());
+  return {static_cast<const std::uint8_t*>(array.data()), static_cast<std::size_t>(array.size())};
+}
+
 const double* rows_data(const FloatArray& object, const char* name, py::ssize_t columns, py::ssize_t& rows) {
   const py::array array = strict_array(object, name, py::dtype::of<double>());
   if (array.ndim() != 2 || array.shape(1) != columns) {

@@ -32,6 +32,13 @@ class TimeArray : public py::object {
   static bool is_any(PyObject* /*object*/) { return true; }
 };
 
+/// A long array of bool, taken as it is.
+class BoolArray : public py::object {
+ public:
+  PYBIND11_OBJECT_DEFAULT(BoolArray, py::object, is_any)
+  static bool is_any(PyObject* /*object*/) { return true; }
+};
+
 /// A short array, or a list of numbers.
 class ArrayLike : public py::object {
  public:
@@ -44,10 +51,11 @@ using Rows = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, columns, Eig
 template <int columns>
 using MutableRows = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, columns, Eigen::RowMajor>>;
 
-/// Views of what Python holds; valid while the argument lives. @param like how many rows are expected and of whom:
-/// "times_ns". @throws py::type_error, py::value_error
+/// Views of what Python holds; valid while the argument lives. @param expected, like how many rows it must have, and
+/// like which other argument. @throws py::type_error, py::value_error
 std::span<const loc::TimeNs> times_view(const TimeArray& array, const char* name);
 std::span<const double> values_view(const FloatArray& array, const char* name);
+std::span<const std::uint8_t> mask_view(const BoolArray& array, const char* name);
 const double* rows_data(const FloatArray& array, const char* name, py::ssize_t columns, py::ssize_t& rows);
 void require_rows(py::ssize_t rows, const char* name, py::ssize_t expected, const char* like);
 
@@ -104,6 +112,10 @@ struct handle_type_name<locpy::FloatArray> {
 template <>
 struct handle_type_name<locpy::TimeArray> {
   static constexpr auto name = const_name("numpy.typing.NDArray[numpy.int64]");
+};
+template <>
+struct handle_type_name<locpy::BoolArray> {
+  static constexpr auto name = const_name("numpy.typing.NDArray[numpy.bool]");
 };
 template <>
 struct handle_type_name<locpy::ArrayLike> {

@@ -1,0 +1,204 @@
+// io/: sources of measurements, whole recordings as arrays, TUM trajectories, rig files.
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <filesystem>
+#include <memory>
+#include <utility>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "libloc/core/check.hpp"
+#include "libloc/geometry/trajectory.hpp"
+#include "libloc/io/broad.hpp"
+#include "libloc/io/csv.hpp"
+#include "libloc/io/euroc.hpp"
+#include "libloc/io/rig_yaml.hpp"
+#include "libloc/io/tum.hpp"
+#include "msgs/lcm_log_source.hpp"
+#include "recording.hpp"
+
+namespace locpy {
+namespace {
+
+namespace fs = std::filesystem;
+using loc::MeasurementSource;
+
+/// What Python keeps of a recording; the arrays own the vectors that were filled.
+struct ImuArrays {
+  py::array_t<loc::TimeNs> times_ns;
+  py::array_t<double> angular_velocity;
+  py::array_t<double> specific_force;
+};
+struct MagnetometerArrays {
+  py::array_t<loc::TimeNs> times_ns;
+  py::array_t<double> magnetic_field;
+};
+struct ReferenceArrays {
+  py::array_t<loc::TimeNs> times_ns;
+  py::array_t<double> q_world_body_wxyz;
+  py::array_t<double> position;
+  py::array_t<double> velocity;
+  py::array_t<bool> score;
+};
+struct GpsArrays {
+  py::array_t<loc::TimeNs> times_ns;
+  py::array_t<double> latitude_longitude_altitude;
+  py::array_t<double> velocity_enu;
+  py::array_t<std::int8_t> fix;
+};
+struct Recording {
+  ImuArrays imu;
+  MagnetometerArrays magnetometer;
+  ReferenceArrays reference;
+  GpsArrays gps;
+  std::int64_t images = 0;
+  std::map<std::string, std::int64_t> counts;
+};
+
+Recording read_all(MeasurementSource& source) {
+  Columns columns;
+  loc::NamedCounts counts;
+  {
+    const py::gil_scoped_release no_gil;
+    py::ssize_t n = 0;
+    while (const auto measurement = source.next()) {
+      columns.add(*measurement);
+      if (++n % kSignalInterval == 0) check_signals();
+    }
+    counts = source.counts();
+  }
+  Recording out;
+  out.imu = {hand_over(std::move(columns.imu.times_ns)), hand_over(std::move(columns.imu.angular_velocity), 3),
+             hand_over(std::move(columns.imu.specific_force), 3)};
+  out.magnetometer = {hand_over(std::move(columns.magnetometer.times_ns)),
+                      hand_over(std::move(columns.magnetometer.magnetic_field), 3)};
+  auto& r = columns.reference;
+  out.reference = {hand_over(std::move(r.times_ns)), hand_over(std::move(r.q_world_body_wxyz), 4),
+                   hand_over(std::move(r.position), 3), hand_over(std::move(r.velocity), 3),
+                   py::array_t<bool>(hand_over(std::move(r.score)).attr("view")("bool"))};
+  auto& g = columns.gps;
+  out.gps = {hand_over(std::move(g.times_ns)), hand_over(std::move(g.latitude_longitude_altitude), 3),
+             hand_over(std::move(g.velocity_enu), 3), hand_over(std::move(g.fix))};
+  out.images = columns.images;
+  out.counts = as_map(counts);
+  return out;
+}
+
+void bind_recording(py::module_& m) {
+  py::class_<ImuArrays>(m, "ImuArrays", "IMU samples of a recording; empty when there are none.")
+      .def_readonly("times_ns", &ImuArrays::times_ns, "(N,) int64")
+      .def_readonly("angular_velocity", &ImuArrays::angular_velocity, "(N, 3) [rad/s]")
+      .def_readonly("specific_force", &ImuArrays::specific_force, "(N, 3) [m/s^2], at rest +9.81 upwards");
+  py::class_<MagnetometerArrays>(m, "MagnetometerArrays", "Magnetometer samples, empty when there are none.")
+      .def_readonly("times_ns", &MagnetometerArrays::times_ns, "(N,) int64")
+      .def_readonly("magnetic_field", &MagnetometerArrays::magnetic_field, "(N, 3) [T]");
+  py::class_<ReferenceArrays>(m, "ReferenceArrays", "Truth, empty when there is none; NaN where it does not know.")
+      .def_readonly("times_ns", &ReferenceArrays::times_ns, "(N,) int64")
+      .def_readonly("q_world_body_wxyz", &ReferenceArrays::q_world_body_wxyz, "(N, 4)")
+      .def_readonly("position", &ReferenceArrays::position, "(N, 3) [m], of body in world")
+      .def_readonly("velocity", &ReferenceArrays::velocity, "(N, 3) [m/s], in world")
+      .def_readonly("score", &ReferenceArrays::score, "(N,) bool; False: do not score here");
+  py::class_<GpsArrays>(m, "GpsArrays", "GPS fixes, empty when there are none; NaN where the receiver did not say.")
+      .def_readonly("times_ns", &GpsArrays::times_ns, "(N,) int64")
+      .def_readonly("latitude_longitude_altitude", &GpsArrays::latitude_longitude_altitude, "(N, 3) [rad, rad, m]")
+      .def_readonly("velocity_enu", &GpsArrays::velocity_enu, "(N, 3) [m/s]")
+      .def_readonly("fix", &GpsArrays::fix, "(N,) int8, GpsFixType");
+  py::class_<Recording>(m, "Recording", "A whole recording as arrays.")
+      .def_readonly("imu", &Recording::imu)
+      .def_readonly("magnetometer", &Recording::magnetometer)
+      .def_readonly("reference", &Recording::reference)
+      .def_readonly("gps", &Recording::gps)
+      .def_readonly("images", &Recording::images, "How many pictures there were; iterate over a source to get them.")
+      .def_readonly("counts", &Recording::counts, "What was read and what was skipped, and why.");
+}
+
+void bind_sources(py::module_& m) {
+  py::class_<MeasurementSource>(m, "MeasurementSource",
+                                "Iterates over the measurements of a recording in time order, in constant memory. "
+                                "DataError names file, line or byte, field and value when it cannot be read on.")
+      .def("__iter__", [](const py::object& self) { return self; })
+      .def("__next__",
+           [](MeasurementSource& self) {
+             std::optional<loc::Measurement> measurement;
+             {
+               const py::gil_scoped_release no_gil;
+               measurement = self.next();
+             }
+             if (!measurement) throw py::stop_iteration();
+             return std::move(*measurement);
+           })
+      .def("read_all", &read_all, "The rest of the recording as arrays.")
+      .def(
+          "counts", [](const MeasurementSource& self) { return as_map(self.counts()); },
+          "What was read and what was skipped, and why: {name: number}.");
+  m.def(
+      "open_euroc",
+      [](const fs::path& folder, bool reference, bool magnetometer) {
+        return loc::open_euroc(folder, {.read_reference = reference, .read_magnetometer = magnetometer});
+      },
+      py::arg("folder"), py::kw_only(), py::arg("reference") = true, py::arg("magnetometer") = true,
+      "A EuRoC / ASL recording: the folder that holds mav0.");
+  m.def(
+      "open_csv",
+      [](const fs::path& path, const std::string& time_unit, const std::string& angular_velocity_unit,
+         const std::string& specific_force_unit, const std::string& magnetic_field_unit, double tesla_per_unit) {
+        return loc::open_csv(path, {.time_unit = time_unit,
+                                    .angular_velocity_unit = angular_velocity_unit,
+                                    .specific_force_unit = specific_force_unit,
+                                    .magnetic_field_unit = magnetic_field_unit,
+                                    .tesla_per_unit = tesla_per_unit});
+      },
+      py::arg("path"), py::kw_only(), py::arg("time_unit") = "", py::arg("angular_velocity_unit") = "",
+      py::arg("specific_force_unit") = "", py::arg("magnetic_field_unit") = "", py::arg("tesla_per_unit") = 0.0,
+      "A CSV file whose first line names columns and units: time_ns or \"t [s]\", wx wy wz, ax ay az, mx my mz, "
+      "qw qx qy qz, px py pz ... The units given here are for headings that have none.");
+  m.def(
+      "open_broad",
+      [](const fs::path& path, bool reference) {
+        return loc::open_broad(path, {.start_ns = 0, .read_reference = reference});
+      },
+      py::arg("path"), py::kw_only(), py::arg("reference") = true, "A trial of the BROAD data set (.mat).");
+  m.def(
+      "open_lcm_log",
+      [](const fs::path& path) -> std::unique_ptr<MeasurementSource> { return loc::open_lcm_log(path); },
+      py::arg("path"),
+      "The measurements in an LCM log, in the order of the log: package loc's types and ASPN-23's. What cannot be "
+      "decoded is counted.");
+}
+
+void bind_tum(py::module_& m) {
+  m.def(
+      "read_tum",
+      [](const fs::path& path) {
+        const loc::TumTrajectory tum = loc::read_tum(path);
+        loc::Trajectory trajectory;
+        for (const loc::StampedPose& pose : tum.poses) trajectory.push_back(pose.time_ns, pose.T_world_body);
+        return std::pair(std::move(trajectory), as_map(tum.counts));
+      },
+      py::arg("path"),
+      "A trajectory in TUM's format, and what was read and skipped. DataError names file, line and value.");
+  m.def(
+      "write_tum",
+      [](const fs::path& path, const loc::Trajectory& trajectory) {
+        std::vector<loc::StampedPose> poses(trajectory.size());
+        for (std::size_t i = 0; i < poses.size(); ++i) poses[i] = {trajectory.times_ns[i], trajectory.poses[i]};
+        loc::write_tum(path, poses);
+      },
+      py::arg("path"), py::arg("trajectory"), "Writes a trajectory in TUM's format.");
+}
+
+}  // namespace
+
+void bind_io(py::module_& m) {
+  bind_sources(m);
+  bind_recording(m);
+  bind_tum(m);
+  m.def("read_rig", &loc::read_rig, py::arg("path"), "rig.yaml. DataError names file, line, key and value.");
+  m.def("read_any_rig", &loc::read_any_rig, py::arg("path"),
+        "rig.yaml, Kalibr's camchain or imu.yaml, EuRoC's sensor.yaml: whichever it is.");
+  m.def("write_rig", &loc::write_rig, py::arg("path"), py::arg("rig"),
+        "Writes rig.yaml; read_rig gives the same numbers back.");
+}
+
+}  // namespace locpy
