@@ -28,8 +28,8 @@ std::string read_text(const std::filesystem::path& path) {
 
 }  // namespace
 
-YamlBlock::YamlBlock(std::string file, std::string name, YAML::Node node)
-    : file_(std::move(file)), name_(std::move(name)), node_(std::move(node)) {
+YamlBlock::YamlBlock(std::string file, std::string name, const YAML::Node& node)
+    : file_(std::move(file)), name_(std::move(name)), node_(node) {
   if (!node_.IsMap()) throw DataError(where(node_) + ": '" + (name_.empty() ? "the file" : name_) + "' must hold keys");
   std::set<std::string> keys;
   for (const auto& entry : node_) {

@@ -51,7 +51,7 @@ class YamlBlock {
   [[noreturn]] void fail(const char* key, const std::string& what) const;
 
  private:
-  YamlBlock(std::string file, std::string name, YAML::Node node);
+  YamlBlock(std::string file, std::string name, const YAML::Node& node);
   YAML::Node get(const char* key);
   std::string where(const YAML::Node& node) const;
   std::string full(const std::string& key) const { return name_.empty() ? key : name_ + "." + key; }
