@@ -36,7 +36,9 @@ TimeNs parse_seconds(std::string_view text) {
     std::string_view digits = rest.substr(e + 1);
     if (!digits.empty() && digits.front() == '+') digits.remove_prefix(1);
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), exponent);
-    if (error != std::errc{} || end != digits.data() + digits.size() || std::abs(exponent) > 40) reject(text);
+    if (error != std::errc{} || end != digits.data() + digits.size() || exponent < -40 || exponent > 40) {
+      reject(text);
+    }
     rest = rest.substr(0, e);
   }
   const auto point = rest.find('.');

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "libloc/core/time.hpp"
+#include "libloc/sensors/measurements.hpp"
 
 namespace loc {
 
@@ -45,11 +46,12 @@ struct Estimate {
   std::uint32_t valid = 0;        ///< EstimateValid
   std::uint32_t status = 0;       ///< EstimateStatus
   Eigen::Quaterniond q_world_body{1, 0, 0, 0};
-  Eigen::Vector3d position;            ///< of body in world [m]
-  Eigen::Vector3d velocity;            ///< in world [m/s]
-  Eigen::Vector3d angular_velocity;    ///< of body in body axes, bias removed [rad/s]
-  Eigen::Vector3d gyroscope_bias;      ///< [rad/s]
-  Eigen::Vector3d accelerometer_bias;  ///< [m/s^2]
+  Eigen::Vector3d position = Eigen::Vector3d::Constant(kUnknown);  ///< of body in world [m]
+  Eigen::Vector3d velocity = Eigen::Vector3d::Constant(kUnknown);  ///< in world [m/s]
+  Eigen::Vector3d angular_velocity =
+      Eigen::Vector3d::Constant(kUnknown);                               ///< of body in body axes, bias removed [rad/s]
+  Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Constant(kUnknown);  ///< [rad/s]
+  Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Constant(kUnknown);  ///< [m/s^2]
   /// Of the error (theta [rad, body axes], p, v, bg, ba); the first covariance_dim rows and columns hold something.
   Eigen::Matrix<double, kMaxEstimateDim, kMaxEstimateDim> covariance;
   int covariance_dim = 0;

@@ -442,7 +442,6 @@ bool MadgwickFilter::process(const Measurement& measurement) {
 }
 
 Estimate MadgwickFilter::estimate() const {
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   Estimate estimate;
   estimate.time_ns = last_.time_ns;
   estimate.host_time_ns = last_.host_time_ns;
@@ -452,11 +451,8 @@ Estimate MadgwickFilter::estimate() const {
   if (initialised_) estimate.valid |= kValidOrientation;
   if (heading_known_) estimate.valid |= kValidHeading;
   if (bias_known_) estimate.valid |= kValidGyroscopeBias;
-  estimate.position.setConstant(kNaN);
-  estimate.velocity.setConstant(kNaN);
   estimate.angular_velocity = rate_;
-  estimate.gyroscope_bias = bias_known_ ? bias_ : Eigen::Vector3d::Constant(kNaN);
-  estimate.accelerometer_bias.setConstant(kNaN);
+  if (bias_known_) estimate.gyroscope_bias = bias_;
   return estimate;
 }
 
