@@ -22,7 +22,8 @@ int main(int argc, char** argv) {
       ->required()
       ->check(CLI::IsMember({"euroc", "lcm-log", "csv", "broad"}));
   app.add_option("PATH", path, "The recording")->required()->check(CLI::ExistingPath);
-  app.add_option("--transport", transport, "auto: multicast where it works, otherwise a hub of its own; udpm; hub")
+  app.add_option("--transport", transport,
+                 "auto: multicast where it works, otherwise (and to log at full speed) a hub of its own; udpm; hub")
       ->check(CLI::IsMember({"auto", "udpm", "hub"}))
       ->capture_default_str();
   app.add_option("--lcm-url", options.lcm_url, "Use this transport; a hub there must run already");
@@ -41,6 +42,7 @@ int main(int argc, char** argv) {
     options.transport = transport == "auto"   ? loc::Transport::kAuto
                         : transport == "udpm" ? loc::Transport::kUdpm
                                               : loc::Transport::kHub;
+    options.as_fast_as_taken = speed == "max";
     options.driver = {kind, path, "--speed", speed};
     for (std::string& argument : CLI::detail::split_up(driver_arguments)) options.driver.push_back(std::move(argument));
     options.estimator = CLI::detail::split_up(estimator_arguments);

@@ -125,6 +125,10 @@ std::optional<std::string> ChildProcess::read_line(TimeNs patience_ns) {
   }
 }
 
+bool ChildProcess::stopped_early() const {
+  return ended_ && WIFSIGNALED(status_) && WTERMSIG(status_) == SIGTERM;
+}
+
 std::string ChildProcess::describe() const {
   if (!ended_) return "running";
   if (WIFSIGNALED(status_)) {

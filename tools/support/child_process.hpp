@@ -41,6 +41,8 @@ class ChildProcess {
 
   /// Ended with exit code 0.
   bool succeeded() const { return ended_ && status_ == 0; }
+  /// Ended by stop(), before it had installed a handler for SIGTERM.
+  bool stopped_early() const;
   /// "exit code 1", "signal 9 (Killed)", "running"
   std::string describe() const;
 

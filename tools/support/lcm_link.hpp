@@ -35,6 +35,7 @@ class LcmPublisher {
   /// @return false when the message could not be sent: counted in failed().
   bool publish(const std::string& channel, std::span<const std::uint8_t> data);
   template <class Message>
+  requires requires(const Message& m) { m.getEncodedSize(); }
   bool publish(const std::string& channel, const Message& message) {
     buffer_.resize(static_cast<std::size_t>(message.getEncodedSize()));
     message.encode(buffer_.data(), 0, static_cast<int>(buffer_.size()));

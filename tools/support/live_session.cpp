@@ -56,7 +56,15 @@ void LiveSession::choose_transport() {
     return;
   }
   std::string reason;
-  const bool multicast = options_.transport != Transport::kHub && multicast_works(kDefaultLcmUrl, &reason);
+  bool multicast = options_.transport != Transport::kHub && multicast_works(kDefaultLcmUrl, &reason);
+  if (options_.as_fast_as_taken && !options_.log_path.empty() && multicast) {
+    if (options_.transport == Transport::kUdpm) {
+      spdlog::warn("event=log_may_lack_messages reason=\"the logger is slower than --speed max on udpm\"");
+    } else {
+      multicast = false;
+      reason = "at full speed the logger would lose messages on udpm";
+    }
+  }
   if (options_.transport == Transport::kUdpm && !multicast) {
     throw std::runtime_error("multicast does not work here (" + reason +
                              "): as root, ip route add 224.0.0.0/4 dev lo; or use --transport hub");
@@ -207,7 +215,7 @@ void LiveSession::stop(Member& member) {
   if (ran && !member.process->stop(kStopPatience)) {
     spdlog::error("event=process_killed program={} reason=\"did not end when asked to\"", member.name);
     all_well_ = false;
-  } else if (ran && !member.process->succeeded()) {
+  } else if (ran && !member.process->succeeded() && !member.process->stopped_early()) {
     spdlog::error("event=process_failed program={} how=\"{}\"", member.name, member.process->describe());
     all_well_ = false;
   } else {

@@ -15,6 +15,9 @@ namespace loc {
 enum class Transport { kAuto, kUdpm, kHub };
 
 struct LiveSessionOptions {
+  /// The driver sends as fast as the estimator takes it: faster than the stock logger does, whose queue on multicast
+  /// holds 30 messages. auto is the hub then.
+  bool as_fast_as_taken = false;
   Transport transport = Transport::kAuto;  ///< auto: multicast where it works, otherwise a hub
   std::string lcm_url;                     ///< not empty: that one, nothing is started for it
   std::string log_path;                    ///< empty: no logger

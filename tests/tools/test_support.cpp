@@ -1,0 +1,284 @@
+// The parts of the programs, each for itself.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <thread>
+
+#include "libloc/core/check.hpp"
+#include "loc/estimate_t.hpp"
+#include "loc/statistics_t.hpp"
+#include "tools/support/any_estimator.hpp"
+#include "tools/support/channels.hpp"
+#include "tools/support/flow_control.hpp"
+#include "tools/support/input_queues.hpp"
+#include "tools/support/lcm_link.hpp"
+#include "tools/support/pacer.hpp"
+#include "tools/support/pipeline.hpp"
+#include "tools/support/program.hpp"
+
+namespace loc {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+constexpr TimeNs kMs = 1'000'000;
+
+template <class Message>
+Bytes encoded(const Message& message) {
+  Bytes bytes(static_cast<std::size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+TEST(InputQueues, GivesBackInOrderOfArrivalOverAllInputs) {
+  InputQueues queues({{"a", 4, 100}, {"b", 4, 100}});
+  queues.push(1, Bytes{1}, 10);
+  queues.push(0, Bytes{2}, 11);
+  queues.push(1, Bytes{3}, 12);
+  RawMessage message;
+  for (const std::uint8_t expected : Bytes{1, 2, 3}) {
+    ASSERT_TRUE(queues.pop(message, 0));
+    EXPECT_EQ(message.bytes, Bytes{expected});
+    EXPECT_EQ(message.input, expected == 2 ? 0U : 1U);
+    EXPECT_EQ(message.receive_time_ns, 9 + expected);
+  }
+  EXPECT_FALSE(queues.pop(message, kMs));
+}
+
+TEST(InputQueues, FullQueuesDropAsTold) {
+  InputQueues queues({{"imu", 2, 100}, {"image", 2, 100, 0, WhenFull::kDropOldest}});
+  for (std::uint8_t i = 0; i < 5; ++i) {
+    EXPECT_EQ(queues.push(0, Bytes{i}, 0), i < 2);
+    EXPECT_EQ(queues.push(1, Bytes{i}, 0), i < 2);
+  }
+  EXPECT_FALSE(queues.push(0, Bytes(101), 0));
+  RawMessage message;
+  std::vector<int> imu;
+  std::vector<int> image;
+  while (queues.pop(message, 0)) (message.input == 0 ? imu : image).push_back(message.bytes[0]);
+  EXPECT_EQ(imu, (std::vector<int>{0, 1}));
+  EXPECT_EQ(image, (std::vector<int>{3, 4}));
+  EXPECT_EQ(queues.dropped(0), 3);
+  EXPECT_EQ(queues.dropped(1), 3);
+  EXPECT_EQ(format_counts(queues.counts()),
+            "imu.dropped=3 imu.oversized=1 imu.waiting_max=2 image.dropped=3 image.oversized=0 image.waiting_max=2");
+}
+
+TEST(InputQueues, WakesTheOneThatWaits) {
+  InputQueues queues({{"a", 4, 100}});
+  std::thread sender([&] { queues.push(0, Bytes{7}, 0); });
+  RawMessage message;
+  EXPECT_TRUE(queues.pop(message, 5'000 * kMs));
+  sender.join();
+}
+
+TEST(Pacer, WaitsByTheTimeStamps) {
+  Pacer real_time(1);
+  EXPECT_EQ(real_time.wait_ns(1000 * kMs, 5 * kMs), 0);
+  EXPECT_EQ(real_time.wait_ns(1010 * kMs, 5 * kMs), 10 * kMs);
+  EXPECT_EQ(real_time.wait_ns(1010 * kMs, 12 * kMs), 3 * kMs);
+  EXPECT_EQ(real_time.wait_ns(1020 * kMs, 40 * kMs), 0);
+  EXPECT_EQ(real_time.max_lag_ns(), 15 * kMs);
+  Pacer fast(4);
+  EXPECT_EQ(fast.wait_ns(0, 0), 0);
+  EXPECT_EQ(fast.wait_ns(100 * kMs, 0), 25 * kMs);
+  Pacer all_at_once(0);
+  EXPECT_EQ(all_at_once.wait_ns(0, 0), 0);
+  EXPECT_EQ(all_at_once.wait_ns(1'000'000 * kMs, 0), 0);
+}
+
+TEST(Pacer, TakesUpThePaceAfterAStepOfTheClock) {
+  Pacer pacer(1);
+  pacer.wait_ns(500'000 * kMs, 0);
+  EXPECT_EQ(pacer.wait_ns(100 * kMs, 10 * kMs), 0) << "set back";
+  EXPECT_EQ(pacer.wait_ns(110 * kMs, 10 * kMs), 10 * kMs);
+  EXPECT_EQ(pacer.wait_ns(std::numeric_limits<TimeNs>::max(), 20 * kMs), 0) << "a time from nowhere";
+  EXPECT_EQ(pacer.wait_ns(std::numeric_limits<TimeNs>::min() + 1, 20 * kMs), 0);
+  EXPECT_EQ(pacer.restarts(), 3);
+  EXPECT_THROW(Pacer(-1), std::invalid_argument);
+  EXPECT_THROW(Pacer(std::nan("")), std::invalid_argument);
+}
+
+Bytes answer(std::int64_t imu_sequence, int process_id = 1) {
+  statistics_t message{};
+  message.program = kEstimatorProgram;
+  message.process_id = process_id;
+  message.name = {kImuSequence};
+  message.value = {static_cast<double>(imu_sequence)};
+  message.size = 1;
+  return encoded(message);
+}
+
+TEST(FlowControl, KeepsTheWindow) {
+  FlowControl flow(3);
+  for (std::int64_t i = 0; i < 3; ++i) {
+    EXPECT_TRUE(flow.may_send());
+    flow.sent(i);
+  }
+  EXPECT_FALSE(flow.may_send());
+  estimate_t estimate{};
+  estimate.sequence = 900;
+  flow.on_estimate(encoded(estimate));
+  EXPECT_FALSE(flow.may_send()) << "that sample was never sent by us";
+  estimate.sequence = 0;
+  flow.on_estimate(encoded(estimate));
+  EXPECT_TRUE(flow.may_send());
+  EXPECT_EQ(flow.outstanding(), 2);
+  flow.on_statistics(answer(2), 0);
+  EXPECT_EQ(flow.outstanding(), 0);
+  EXPECT_EQ(flow.abandoned(), 0);
+}
+
+TEST(FlowControl, GivesUpSamplesThatWereLost) {
+  FlowControl flow(2);
+  flow.sent(0);
+  flow.sent(1);
+  flow.on_statistics(answer(0), 0);
+  flow.sent(2);
+  flow.on_statistics(answer(0), FlowControl::kLostAfterNs / 2);
+  flow.on_statistics(answer(0), FlowControl::kLostAfterNs * 5 / 4);
+  EXPECT_FALSE(flow.may_send()) << "it was sent to in between";
+  flow.on_statistics(answer(0), FlowControl::kLostAfterNs * 2);
+  EXPECT_TRUE(flow.may_send());
+  EXPECT_EQ(flow.abandoned(), 2);
+}
+
+TEST(FlowControl, AnEstimatorThatWasStartedAnewKnowsNothingOfTheOldWindow) {
+  FlowControl flow(2);
+  flow.on_statistics(answer(-1, 100), 0);
+  flow.sent(0);
+  flow.sent(1);
+  flow.on_statistics(answer(-1, 200), 1);
+  EXPECT_TRUE(flow.may_send());
+  EXPECT_EQ(flow.abandoned(), 2);
+}
+
+TEST(FlowControl, GarbageChangesNothing) {
+  FlowControl flow(1);
+  flow.sent(0);
+  flow.on_estimate(Bytes(200, 0xff));
+  flow.on_statistics(Bytes{1, 2, 3}, 0);
+  statistics_t other{};
+  other.program = "loc-hub";
+  flow.on_statistics(encoded(other), 0);
+  EXPECT_FALSE(flow.may_send());
+  EXPECT_FALSE(flow.answered());
+  EXPECT_EQ(flow.garbage(), 2);
+}
+
+ImuMeasurement imu_sample(TimeNs time, std::int64_t sequence) {
+  ImuMeasurement imu;
+  imu.time_ns = time;
+  imu.sequence = sequence;
+  imu.angular_velocity = {0.1, 0.2, -0.1};
+  imu.specific_force = {0, 0, 9.80665};
+  return imu;
+}
+
+std::int64_t value_of(const NamedCounts& counts, const std::string& name) {
+  for (const NamedCount& count : counts) {
+    if (count.name == name) return count.value;
+  }
+  ADD_FAILURE() << "no count " << name << " in " << format_counts(counts);
+  return -1;
+}
+
+struct PipelineFixture {
+  std::vector<Estimate> estimates;
+  EstimatorPipeline pipeline{make_estimator({}), {}, {}, [this](const Estimate& e) { estimates.push_back(e); }};
+};
+
+TEST(Pipeline, CountsLossesRepeatsAndRestarts) {
+  PipelineFixture f;
+  TimeNs time = 0;
+  for (const std::int64_t sequence : {0, 1, 2, 5, 5, 6, 0, 1}) f.pipeline.push(imu_sample(time += 5 * kMs, sequence));
+  f.pipeline.end();
+  const NamedCounts counts = f.pipeline.counts();
+  EXPECT_EQ(value_of(counts, "imu.received"), 8);
+  EXPECT_EQ(value_of(counts, "imu.lost"), 2);
+  EXPECT_EQ(value_of(counts, "imu.repeated"), 1);
+  EXPECT_EQ(value_of(counts, "imu.restarts"), 1);
+  EXPECT_EQ(value_of(counts, "estimates"), 8);
+}
+
+TEST(Pipeline, AbsurdSequenceNumbersDoNotOverflow) {
+  PipelineFixture f;
+  f.pipeline.push(imu_sample(1, 0));
+  f.pipeline.push(imu_sample(2, std::numeric_limits<std::int64_t>::max()));
+  f.pipeline.push(imu_sample(3, 0));
+  f.pipeline.push(imu_sample(4, std::numeric_limits<std::int64_t>::max()));
+  EXPECT_EQ(value_of(f.pipeline.counts(), "imu.lost"), std::numeric_limits<std::int64_t>::max());
+}
+
+TEST(Pipeline, ClockSetBackStartsTheEstimatorAnew) {
+  PipelineFixture f;
+  for (int i = 0; i < 100; ++i) f.pipeline.push(imu_sample(1'000'000 * kMs + i * 5 * kMs, i));
+  for (int i = 100; i < 200; ++i) f.pipeline.push(imu_sample(i * 5 * kMs, i));
+  f.pipeline.end();
+  const NamedCounts counts = f.pipeline.counts();
+  EXPECT_EQ(value_of(counts, "clock.resets"), 1);
+  EXPECT_EQ(value_of(counts, "imu.skipped.time_not_increasing"), 0) << "the estimator was not reset";
+  EXPECT_EQ(value_of(counts, "imu.late") + static_cast<std::int64_t>(f.estimates.size()), 200);
+  EXPECT_EQ(f.estimates.back().time_ns, 199 * 5 * kMs);
+}
+
+TEST(Pipeline, RecordingAfterRecording) {
+  PipelineFixture f;
+  for (int recording = 0; recording < 2; ++recording) {
+    for (int i = 0; i < 50; ++i) f.pipeline.push(imu_sample(i * 5 * kMs, i));
+    f.pipeline.end();
+  }
+  EXPECT_EQ(f.estimates.size(), 100U);
+  EXPECT_EQ(f.estimates[0].q_world_body.coeffs(), f.estimates[50].q_world_body.coeffs());
+  EXPECT_EQ(f.estimates[49].q_world_body.coeffs(), f.estimates[99].q_world_body.coeffs());
+}
+
+TEST(Pipeline, RigIsApplied) {
+  Rig rig;
+  rig.imu.emplace();
+  rig.imu->gyroscope.bias = {0.1, 0.2, -0.1};
+  Estimate last;
+  EstimatorSettings settings;
+  settings.madgwick = MadgwickOptions::report();
+  EstimatorPipeline pipeline(make_estimator(settings), rig, {}, [&](const Estimate& e) { last = e; });
+  for (int i = 0; i < 10; ++i) pipeline.push(imu_sample(i * 5 * kMs, i));
+  pipeline.end();
+  EXPECT_LT(last.angular_velocity.norm(), 1e-12);
+}
+
+TEST(AnyEstimator, NamesLeadToEstimators) {
+  for (const std::string& name : estimator_methods()) {
+    EstimatorSettings settings;
+    settings.method = name;
+    EXPECT_EQ(make_estimator(settings).method(), name);
+  }
+  EstimatorSettings wrong;
+  wrong.method = "kalman";
+  EXPECT_THROW(make_estimator(wrong), std::invalid_argument);
+  EstimatorSettings six_axes;
+  six_axes.use_magnetometer = false;
+  EXPECT_FALSE(make_estimator(six_axes).takes(StreamKind::kMagnetometer));
+}
+
+TEST(Channels, AreParsedStrictly) {
+  EXPECT_EQ(parse_channels({"imu=A", "gps=B=C"})[0], "A");
+  EXPECT_EQ(parse_channels({"imu=A", "gps=B=C"})[3], "B=C");
+  for (const std::string wrong : {"imu", "imu=", "sonar=X", "=X"}) EXPECT_THROW(parse_channels({wrong}), UsageError);
+  EXPECT_THROW(parse_channels({"imu=" + std::string(64, 'x')}), UsageError);
+}
+
+TEST(LcmLink, SaysWhatIsWrongWithTheUrl) {
+  for (const std::string wrong : {"127.0.0.1:7700", "http://127.0.0.1", "tcpq://localhost:7700", "tcpq://127.0.0.1:0",
+                                  "tcpq://127.0.0.1:99999", "udpm://239.255.76.67:x"}) {
+    EXPECT_THROW(open_lcm(wrong), UsageError) << wrong;
+  }
+  try {
+    open_lcm("tcpq://127.0.0.1:1");
+    FAIL() << "nobody listens there";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("loc-hub"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace loc
