@@ -6,5 +6,8 @@ world has z up (unless NED is chosen), body is the IMU; T_a_b takes coordinates 
 
 from libloc._core import *  # noqa: F403
 from libloc._core import so3 as so3
+from libloc.recordings import file_format as file_format
+from libloc.recordings import open_recording as open_recording
+from libloc.recordings import read_recording as read_recording
 
 __version__ = "0.1.0"

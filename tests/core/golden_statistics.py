@@ -10,8 +10,18 @@ DOFS = [1, 2, 3, 4, 5, 6, 9, 12, 15, 21, 30, 50, 75, 100, 150, 200, 250, 300]
 rows = []
 for dof in DOFS:
     deviation = (2 * dof) ** 0.5
-    points = [1e-6, 0.01, 0.3 * dof, 0.7 * dof, dof, dof + 1, dof + deviation, dof + 3 * deviation,
-              dof + 8 * deviation, 3 * dof + 100]
+    points = [
+        1e-6,
+        0.01,
+        0.3 * dof,
+        0.7 * dof,
+        dof,
+        dof + 1,
+        dof + deviation,
+        dof + 3 * deviation,
+        dof + 8 * deviation,
+        3 * dof + 100,
+    ]
     for x in points:
         cdf, survival = chi2.cdf(x, dof), chi2.sf(x, dof)
         if cdf > 1e-290 and survival > 1e-290:

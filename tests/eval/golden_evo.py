@@ -68,8 +68,10 @@ def main():
     write_poses("golden_reference.inc", reference_ns, reference)
     write_poses("golden_estimate.inc", estimate_ns, estimate)
 
-    parts = {"translation": metrics.PoseRelation.translation_part,
-             "rotation": metrics.PoseRelation.rotation_angle_rad}
+    parts = {
+        "translation": metrics.PoseRelation.translation_part,
+        "rotation": metrics.PoseRelation.rotation_angle_rad,
+    }
     out = []
     alignments = []
     for how, method in [("nearest", SyncMethod.nearest_time), ("interpolated", SyncMethod.interpolation)]:
@@ -85,9 +87,12 @@ def main():
                 ape.process_data((ref, aligned))
                 out.append(row(f"ape {how} {mode} {part}", ape))
         for delta, unit, all_pairs, from_reference in [
-            (1, metrics.Unit.frames, False, False), (5, metrics.Unit.frames, False, False),
-            (7, metrics.Unit.frames, True, False), (2.0, metrics.Unit.meters, False, False),
-            (2.0, metrics.Unit.meters, False, True), (3.0, metrics.Unit.meters, True, False),
+            (1, metrics.Unit.frames, False, False),
+            (5, metrics.Unit.frames, False, False),
+            (7, metrics.Unit.frames, True, False),
+            (2.0, metrics.Unit.meters, False, False),
+            (2.0, metrics.Unit.meters, False, True),
+            (3.0, metrics.Unit.meters, True, False),
             (1.5, metrics.Unit.meters, True, True),
         ]:
             for part, relation in parts.items():

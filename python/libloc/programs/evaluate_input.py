@@ -1,0 +1,185 @@
+"""What loc-evaluate compares: poses over time out of any of libloc's formats."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import libloc
+from libloc import DataError, EstimateValid
+from libloc.lcm_log import LogReader
+
+# Axes of world as seen from east-north-up: q_enu_body = q * q_world_body.
+_Q_ENU_WORLD = {
+    "ENU": np.array([1.0, 0, 0, 0]),
+    "NWU": np.array([np.sqrt(0.5), 0, 0, np.sqrt(0.5)]),
+    "NED": np.array([0.0, np.sqrt(0.5), np.sqrt(0.5), 0]),
+}
+
+
+@dataclass
+class Poses:
+    """One trajectory. What is not known at a time is NaN."""
+
+    path: Path
+    form: str
+    times_ns: NDArray[np.int64]  # increasing
+    q_wxyz: NDArray[np.float64]  # (N, 4)
+    position: NDArray[np.float64]  # (N, 3) [m]
+    score: NDArray[np.bool]  # where the recording says that it is to be compared
+    heading_is_absolute: bool | None = None  # tied to north; None: the file does not say
+    world: str | None = None  # axes of world as in the file; None: the file does not say
+    counts: dict[str, int] = field(default_factory=dict)
+
+    def has_orientation(self) -> NDArray[np.bool]:
+        return np.isfinite(self.q_wxyz).all(axis=1)
+
+    def has_position(self) -> NDArray[np.bool]:
+        return np.isfinite(self.position).all(axis=1)
+
+    def trajectory(self, rows: NDArray[np.bool]) -> libloc.Trajectory:
+        """Of the rows; an orientation or position that is not known there is the identity."""
+        q, position = self.q_wxyz[rows], self.position[rows]
+        q = np.where(np.isfinite(q).all(axis=1, keepdims=True), q, [1.0, 0, 0, 0])
+        return libloc.Trajectory(self.times_ns[rows], q, np.nan_to_num(position, nan=0.0))
+
+
+def multiply(p: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Product of quaternions wxyz; one and many."""
+    w1, x1, y1, z1 = np.moveaxis(p, -1, 0)
+    w2, x2, y2, z2 = np.moveaxis(q, -1, 0)
+    return np.stack(
+        [
+            w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
+            w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
+            w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
+            w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
+        ],
+        axis=-1,
+    )
+
+
+def normalised(q: NDArray[np.float64], path: Path) -> NDArray[np.float64]:
+    """Rows of NaN stay; DataError for a row that is far from a unit quaternion."""
+    norm = np.linalg.norm(q, axis=1)
+    wrong = np.flatnonzero(np.isfinite(norm) & (np.abs(norm - 1) > 1e-2))
+    if len(wrong):
+        raise DataError(
+            f"{path}: orientation {wrong[0]} is not a unit quaternion, its norm is {norm[wrong[0]]}"
+        )
+    return np.ascontiguousarray(q / norm[:, None])
+
+
+def _tum(path: Path) -> Poses:
+    trajectory, counts = libloc.read_tum(path)
+    score = np.ones(len(trajectory), dtype=bool)
+    return Poses(
+        path,
+        "tum",
+        trajectory.times_ns,
+        trajectory.q_world_body_wxyz,
+        trajectory.position,
+        score,
+        counts=counts,
+    )
+
+
+def _in_time_order(times_ns: NDArray[np.int64], counts: dict[str, int], name: str) -> NDArray[np.bool]:
+    """Rows later than all before them; the others are counted."""
+    keep = np.ones(len(times_ns), dtype=bool)
+    keep[1:] = times_ns[1:] > np.maximum.accumulate(times_ns)[:-1]
+    if not keep.all():
+        counts[f"{name}.skipped.time_not_increasing"] = int(np.sum(~keep))
+    return keep
+
+
+def _estimates(path: Path, channel: str) -> Poses:
+    """LOC_ESTIMATE messages of a log."""
+    times, q, position, valid, worlds = [], [], [], [], set()
+    with LogReader(path, channels=[channel]) as log:
+        for event in log:
+            m = event.message
+            if not hasattr(m, "q_world_body_wxyz") or not hasattr(m, "valid"):
+                raise DataError(f"{path}: channel {channel} carries {type(m).__name__}, not estimate_t")
+            times.append(m.time_ns)
+            q.append(m.q_world_body_wxyz)
+            position.append(m.position)
+            valid.append(m.valid)
+            worlds.add(m.world)
+    if not times:
+        raise DataError(f"{path}: no message on channel {channel}")
+    if len(worlds) > 1 or not worlds <= _Q_ENU_WORLD.keys():
+        raise DataError(f"{path}: world of the estimates is {sorted(worlds)}: must be one of ENU, NWU, NED")
+    world = worlds.pop()
+    counts = {"estimate.read": len(times)}
+    if log.truncated_bytes:
+        counts["log.truncated_bytes"] = log.truncated_bytes
+    if log.damaged_bytes:
+        counts["log.damaged_bytes"] = log.damaged_bytes
+    flags = np.array(valid, dtype=np.int64)
+    q_rows = np.array(q, dtype=float)
+    q_rows[(flags & EstimateValid.ORIENTATION) == 0] = np.nan
+    position_rows = np.array(position, dtype=float)
+    position_rows[(flags & EstimateValid.POSITION) == 0] = np.nan
+    oriented = np.isfinite(q_rows).all(axis=1)
+    if not oriented.any():
+        raise DataError(f"{path}: none of the {len(times)} estimates has an orientation")
+    absolute = (flags & EstimateValid.HEADING) != 0
+    score = np.ones(len(times), dtype=bool)
+    if absolute[oriented].any():
+        # A heading that is not tied to north yet (no magnetometer so far) has nothing to be compared with.
+        score = absolute | ~oriented
+        if not score.all():
+            counts["estimate.heading_relative"] = int(np.sum(~score))
+    q_enu_world = _Q_ENU_WORLD[world]
+    keep = _in_time_order(np.array(times, dtype=np.int64), counts, "estimate")
+    pose = libloc.Pose3(q_enu_world)
+    return Poses(
+        path=path,
+        form="lcm",
+        times_ns=np.array(times, dtype=np.int64)[keep],
+        q_wxyz=multiply(q_enu_world, normalised(q_rows, path))[keep],
+        position=pose.transform(position_rows)[keep],
+        score=score[keep],
+        heading_is_absolute=bool(absolute[oriented].any()),
+        world=world,
+        counts=counts,
+    )
+
+
+def _reference(path: Path, form: str) -> Poses:
+    """The reference stream of a recording."""
+    recording = libloc.read_recording(path)
+    r = recording.reference
+    if not len(r.times_ns):
+        streams = {"imu": recording.imu, "magnetometer": recording.magnetometer, "gps": recording.gps}
+        found = [f"{name} ({len(s.times_ns)})" for name, s in streams.items() if len(s.times_ns)]
+        raise DataError(f"{path}: no reference poses in it; it holds {', '.join(found) or 'nothing'}")
+    counts = {name: value for name, value in recording.counts.items() if value}
+    keep = _in_time_order(r.times_ns, counts, "reference")
+    return Poses(
+        path=path,
+        form=form,
+        times_ns=r.times_ns[keep],
+        q_wxyz=normalised(r.q_world_body_wxyz, path)[keep],
+        position=r.position[keep],
+        score=r.score[keep],
+        counts=counts,
+    )
+
+
+def read_estimate(path: Path, channel: str) -> Poses:
+    """TUM trajectory, poses in CSV (or a EuRoC folder's, a BROAD trial's), or estimates in an LCM log."""
+    form = libloc.file_format(path)
+    if form == "tum":
+        return _tum(path)
+    return _estimates(path, channel) if form == "lcm" else _reference(path, form)
+
+
+def read_reference(path: Path) -> Poses:
+    """TUM trajectory, EuRoC folder or CSV, BROAD trial, or the reference in an LCM log."""
+    form = libloc.file_format(path)
+    return _tum(path) if form == "tum" else _reference(path, form)
