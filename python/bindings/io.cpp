@@ -13,6 +13,7 @@
 #include "libloc/io/broad.hpp"
 #include "libloc/io/csv.hpp"
 #include "libloc/io/euroc.hpp"
+#include "libloc/io/lcm_log.hpp"
 #include "libloc/io/rig_yaml.hpp"
 #include "libloc/io/tum.hpp"
 #include "msgs/lcm_log_source.hpp"
@@ -167,6 +168,42 @@ void bind_sources(py::module_& m) {
       "decoded is counted.");
 }
 
+void bind_lcm_log(py::module_& m) {
+  py::class_<loc::LcmLogReader>(m, "LcmLogReader",
+                                "Iterates over the events of an LCM log: (event number, log time [us since 1970], "
+                                "channel, data). Damage is skipped to the next event and reported by damage().")
+      .def(py::init([](const fs::path& path) { return std::make_unique<loc::LcmLogReader>(path); }), py::arg("path"),
+           "DataError when the file is missing, not a regular file, or empty.")
+      .def("__iter__", [](const py::object& self) { return self; })
+      .def("__next__",
+           [](loc::LcmLogReader& self) {
+             const loc::LcmLogEvent* event = self.next();
+             if (event == nullptr) throw py::stop_iteration();
+             PyObject* channel = PyUnicode_DecodeUTF8(
+                 event->channel.data(), static_cast<Py_ssize_t>(event->channel.size()), "backslashreplace");
+             if (channel == nullptr) throw py::error_already_set();
+             return std::tuple(event->number, event->log_time_us, py::reinterpret_steal<py::str>(channel),
+                               py::bytes(reinterpret_cast<const char*>(event->data.data()), event->data.size()));
+           })
+      .def(
+          "damage",
+          [](const loc::LcmLogReader& self) {
+            const loc::LcmLogDamage& d = self.damage();
+            std::map<std::string, std::int64_t> out;
+            if (d.first_gap_offset) {
+              out["gaps"] = d.gaps;
+              out["skipped_bytes"] = d.skipped_bytes;
+              out["first_gap_at_byte"] = static_cast<std::int64_t>(*d.first_gap_offset);
+            }
+            if (d.truncated_at) {
+              out["truncated_at_byte"] = static_cast<std::int64_t>(*d.truncated_at);
+              out["truncated_bytes"] = d.truncated_bytes;
+            }
+            return out;
+          },
+          "What was not readable so far; empty when all was.");
+}
+
 void bind_tum(py::module_& m) {
   m.def(
       "read_tum",
@@ -191,8 +228,9 @@ void bind_tum(py::module_& m) {
 }  // namespace
 
 void bind_io(py::module_& m) {
-  bind_sources(m);
   bind_recording(m);
+  bind_sources(m);
+  bind_lcm_log(m);
   bind_tum(m);
   m.def("read_rig", &loc::read_rig, py::arg("path"), "rig.yaml. DataError names file, line, key and value.");
   m.def("read_any_rig", &loc::read_any_rig, py::arg("path"),

@@ -113,7 +113,7 @@ void bind_measurements(py::module_& m) {
   vector_property(reference, "velocity", &ReferenceMeasurement::velocity, "in world (3,) [m/s]");
   reference.def_readwrite("score", &ReferenceMeasurement::score, "False where the recording says: do not score here.");
 
-  py::native_enum<loc::GpsFixType>(m, "GpsFixType", "enum.IntEnum")
+  py::native_enum<loc::GpsFixType>(m, "GpsFixType", "enum.IntEnum", "Kind of a GPS fix.")
       .value("NONE", loc::GpsFixType::kNone)
       .value("TIME", loc::GpsFixType::kTime)
       .value("FIX_2D", loc::GpsFixType::k2d)
@@ -202,25 +202,26 @@ void bind_calibrations(py::module_& m) {
   vector_property(triad, "bias", &TriadCalibration::bias, "(3,), in the sensor's unit");
   matrix_property(triad, "matrix", &TriadCalibration::matrix, "(3, 3): scale, misalignment, soft iron, rotation");
 
-  py::class_<ImuCalibration>(m, "ImuCalibration")
+  py::class_<ImuCalibration>(m, "ImuCalibration", "Rate, noise, and how raw samples are corrected.")
       .def(py::init<>())
       .def_readwrite("rate_hz", &ImuCalibration::rate_hz, "nominal; 0 when unknown")
       .def_readwrite("noise", &ImuCalibration::noise)
       .def_readwrite("gyroscope", &ImuCalibration::gyroscope, "[rad/s]")
       .def_readwrite("accelerometer", &ImuCalibration::accelerometer, "[m/s^2]");
-  py::class_<MagnetometerCalibration>(m, "MagnetometerCalibration")
+  py::class_<MagnetometerCalibration>(m, "MagnetometerCalibration",
+                                      "How raw samples are corrected: hard and soft iron.")
       .def(py::init<>())
       .def_readwrite("triad", &MagnetometerCalibration::triad, "[T], result in body axes");
-  py::class_<GpsCalibration> gps(m, "GpsCalibration");
+  py::class_<GpsCalibration> gps(m, "GpsCalibration", "Where the antenna is.");
   gps.def(py::init<>());
   vector_property(gps, "antenna_in_body", &GpsCalibration::antenna_in_body, "lever arm (3,) [m]");
 
-  py::native_enum<loc::DistortionModel>(m, "DistortionModel", "enum.Enum")
+  py::native_enum<loc::DistortionModel>(m, "DistortionModel", "enum.Enum", "What a lens does.")
       .value("NONE", loc::DistortionModel::kNone)
       .value("RADTAN", loc::DistortionModel::kRadtan)
       .value("EQUIDISTANT", loc::DistortionModel::kEquidistant)
       .finalize();
-  py::class_<CameraCalibration> camera(m, "CameraCalibration");
+  py::class_<CameraCalibration> camera(m, "CameraCalibration", "Projection, pose and time offset of one camera.");
   camera.def(py::init<>())
       .def_readwrite("name", &CameraCalibration::name)
       .def_readwrite("width_px", &CameraCalibration::width_px)

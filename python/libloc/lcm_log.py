@@ -1,8 +1,8 @@
-"""Reading and writing LCM logs with libloc's message types (package loc), through PyPI's lcm.
+"""Reading and writing LCM logs with libloc's message types (package loc, generated for PyPI's lcm).
 
-Every message is checked by libloc's C++ decoder before it is unpacked: lengths that cannot be, a cut message
-or one of the wrong size raise DataError naming file, channel and event. Recordings as arrays:
-libloc.read_recording.
+Logs are written by PyPI's lcm. They are read by libloc's own reader, because that one reports damage and goes
+on behind it, where lcm.EventLog stops in silence; and the C++ decoder checks every message before it is
+unpacked. Recordings as arrays: libloc.read_recording.
 """
 
 from __future__ import annotations
@@ -17,9 +17,7 @@ from typing import Any, Protocol
 import lcm
 import loc
 
-from libloc._core import DataError, message_type
-
-_EVENT_HEADER_BYTES = 28
+from libloc._core import DataError, LcmLogReader, message_type
 
 
 class Message(Protocol):
@@ -41,64 +39,41 @@ class LogMessage:
 
 
 class LogReader:
-    """Iterates over the messages of package loc in a log, in the order of the file.
+    """Iterates once over the messages of package loc in a log, in the order of the file.
 
-        with LogReader("run.lcm", channels=["LOC_ESTIMATE"]) as log:
-            for m in log:
-                print(m.channel, m.message.time_ns)
+        log = LogReader("run.lcm", channels=["LOC_ESTIMATE"])
+        for m in log:
+            print(m.channel, m.message.time_ns)
 
-    Messages of other types are skipped and counted per channel in `skipped`. A log whose last event is cut
-    (its writer was killed) is read up to there; `truncated_bytes` says how many bytes are left. Damage inside
-    the file, where LCM searches for the next event, is counted in `damaged_bytes`.
+    Messages of other types are skipped and counted per channel in `skipped`. A log that is damaged, or whose
+    last event is cut because its writer was killed, is read as far as possible; `damage` tells what was not.
 
-    Raises FileNotFoundError, or DataError for a file that is no LCM log and for a message that cannot be
-    decoded.
+    Raises DataError for a file that is missing or no LCM log, and for a message that cannot be decoded.
     """
 
     def __init__(self, path: str | PathLike[str], channels: Collection[str] | None = None) -> None:
         self.path = Path(path)
-        if not self.path.is_file():
-            raise FileNotFoundError(f"{self.path}: no such file")
         self.channels = None if channels is None else frozenset(channels)
         self.skipped: dict[str, int] = {}
-        self.truncated_bytes = 0
-        self.damaged_bytes = 0
-        self._log = lcm.EventLog(str(self.path), "r")
+        self._events = LcmLogReader(self.path)
 
-    def __enter__(self) -> LogReader:
-        return self
-
-    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self.close()
-
-    def close(self) -> None:
-        self._log.close()
+    @property
+    def damage(self) -> dict[str, int]:
+        """What was not readable so far, {"truncated_bytes": 61, ...}; empty when all was."""
+        return self._events.damage()
 
     def __iter__(self) -> Iterator[LogMessage]:
-        size = self.path.stat().st_size
-        end = self._log.tell()
-        number = 0
-        while (event := self._log.read_next_event()) is not None:
-            length = _EVENT_HEADER_BYTES + len(event.channel.encode()) + len(event.data)
-            self.damaged_bytes += self._log.tell() - end - length
-            end = self._log.tell()
-            number += 1
-            if self.channels is not None and event.channel not in self.channels:
+        for number, log_time_us, channel, data in self._events:
+            if self.channels is not None and channel not in self.channels:
                 continue
             try:
-                name = message_type(event.data)
+                name = message_type(data)
             except DataError as error:
-                raise DataError(
-                    f"{self.path}: event {event.eventnum}, channel {event.channel}: {error}"
-                ) from None
+                raise DataError(f"{self.path}: event {number}, channel {channel}: {error}") from None
             if name is None:
-                self.skipped[event.channel] = self.skipped.get(event.channel, 0) + 1
+                self.skipped[channel] = self.skipped.get(channel, 0) + 1
                 continue
-            message = getattr(loc, name).decode(event.data)
-            yield LogMessage(event.channel, event.timestamp, event.eventnum, message)
-        self.truncated_bytes = size - end
-        if number == 0 and size > 0:
-            raise DataError(f"{self.path}: no LCM event in {size} bytes: not an LCM log")
+            yield LogMessage(channel, log_time_us, number, getattr(loc, name).decode(data))
 
 
 class LogWriter:

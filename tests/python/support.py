@@ -4,8 +4,10 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+import loc
 import numpy as np
 import pytest
+from libloc.lcm_log import LogWriter
 from scipy.spatial.transform import Rotation
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -57,3 +59,40 @@ def turning_body(count: int, rate_hz: float = 200.0, seed: int = 1, noise: float
     field += noise * 2e-7 * rng.normal(size=field.shape)
     times_ns = np.rint(t * 1e9).astype(np.int64) + 1_700_000_000_000_000_000
     return Recording(times_ns, gyro, force, field, to_wxyz(rotation))
+
+
+def write_csv(path: Path, r: Recording) -> None:
+    """The recording in libloc's CSV form, with the truth as reference."""
+    lines = ["time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2,mx_ut,my_ut,mz_ut,qw,qx,qy,qz"]
+    for i, time_ns in enumerate(r.times_ns):
+        values = [*r.gyro[i], *r.force[i], *(r.field[i] * 1e6), *r.q_true_wxyz[i]]
+        lines.append(f"{time_ns}," + ",".join(repr(float(v)) for v in values))
+    path.write_text("\n".join(lines) + "\n")
+
+
+def write_log(
+    path: Path,
+    r: Recording,
+    q_estimate: np.ndarray,
+    heading: bool = True,
+    world: str = "ENU",
+    reference: bool = True,
+) -> None:
+    """An LCM log as loc-live makes it: IMU, estimates (orientation only) and the truth."""
+    nan3 = [float("nan")] * 3
+    with LogWriter(path) as log:
+        for i, time_ns in enumerate(int(t) for t in r.times_ns):
+            imu, estimate, truth = loc.imu_t(), loc.estimate_t(), loc.reference_t()
+            for m in (imu, estimate, truth):
+                m.time_ns, m.host_time_ns, m.sequence = time_ns, time_ns, i
+            imu.angular_velocity, imu.specific_force = list(r.gyro[i]), list(r.force[i])
+            estimate.method, estimate.world = "madgwick", world
+            estimate.valid = loc.estimate_t.VALID_ORIENTATION + heading * loc.estimate_t.VALID_HEADING
+            estimate.q_world_body_wxyz = list(q_estimate[i])
+            estimate.position = estimate.velocity = nan3
+            truth.q_world_body_wxyz, truth.position, truth.velocity = list(r.q_true_wxyz[i]), nan3, nan3
+            truth.score = True
+            log.write("LOC_IMU", imu, time_ns // 1000)
+            log.write("LOC_ESTIMATE", estimate, time_ns // 1000)
+            if reference:
+                log.write("LOC_REFERENCE", truth, time_ns // 1000)

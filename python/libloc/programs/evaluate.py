@@ -1,8 +1,8 @@
 """loc-evaluate: how far estimated orientations or a trajectory are from a reference, in numbers and pictures.
 
 Estimate and reference may each be a TUM trajectory, a EuRoC folder or its ground-truth CSV, a CSV with a
-heading line, a BROAD trial (.mat) or an LCM log; its content says what it is. From a log the estimate is
-the channel LOC_ESTIMATE and the reference is its reference stream; a log that holds both needs no --reference.
+heading line, a BROAD trial (.mat) or an LCM log; its content tells. From a log the estimate is the
+channel LOC_ESTIMATE and the reference is its reference stream; a log that holds both needs no --reference.
 
 Orientation errors are BROAD's: total, heading (about world's vertical), inclination. Position errors are the
 absolute error after an alignment and the relative error over pieces, as evo has them.

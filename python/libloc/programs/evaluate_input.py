@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import loc
 import numpy as np
 from numpy.typing import NDArray
 
@@ -99,26 +100,22 @@ def _in_time_order(times_ns: NDArray[np.int64], counts: dict[str, int], name: st
 def _estimates(path: Path, channel: str) -> Poses:
     """LOC_ESTIMATE messages of a log."""
     times, q, position, valid, worlds = [], [], [], [], set()
-    with LogReader(path, channels=[channel]) as log:
-        for event in log:
-            m = event.message
-            if not hasattr(m, "q_world_body_wxyz") or not hasattr(m, "valid"):
-                raise DataError(f"{path}: channel {channel} carries {type(m).__name__}, not estimate_t")
-            times.append(m.time_ns)
-            q.append(m.q_world_body_wxyz)
-            position.append(m.position)
-            valid.append(m.valid)
-            worlds.add(m.world)
+    log = LogReader(path, channels=[channel])
+    for event in log:
+        m = event.message
+        if not isinstance(m, loc.estimate_t):
+            raise DataError(f"{path}: channel {channel} carries {type(m).__name__}, not estimate_t")
+        times.append(m.time_ns)
+        q.append(m.q_world_body_wxyz)
+        position.append(m.position)
+        valid.append(m.valid)
+        worlds.add(m.world)
     if not times:
         raise DataError(f"{path}: no message on channel {channel}")
     if len(worlds) > 1 or not worlds <= _Q_ENU_WORLD.keys():
         raise DataError(f"{path}: world of the estimates is {sorted(worlds)}: must be one of ENU, NWU, NED")
     world = worlds.pop()
-    counts = {"estimate.read": len(times)}
-    if log.truncated_bytes:
-        counts["log.truncated_bytes"] = log.truncated_bytes
-    if log.damaged_bytes:
-        counts["log.damaged_bytes"] = log.damaged_bytes
+    counts = {"estimate.read": len(times)} | {f"log.{name}": value for name, value in log.damage.items()}
     flags = np.array(valid, dtype=np.int64)
     q_rows = np.array(q, dtype=float)
     q_rows[(flags & EstimateValid.ORIENTATION) == 0] = np.nan

@@ -1,0 +1,47 @@
+"""The examples run, on real recordings where there are any and on generated ones."""
+
+import subprocess
+import sys
+
+from support import CHECKOUT, data_folder, turning_body, write_csv, write_log
+
+EXAMPLES = CHECKOUT / "python/examples"
+
+
+def run(name, *arguments, code=0) -> str:
+    out = subprocess.run(
+        [sys.executable, EXAMPLES / name, *map(str, arguments)], capture_output=True, text=True, check=False
+    )
+    assert out.returncode == code, out.stderr
+    assert "Traceback" not in out.stderr
+    return out.stdout if code == 0 else out.stderr
+
+
+def figure(text: str, name: str) -> float:
+    return float(text.split(f"  {name}: ")[1].split()[0])
+
+
+def test_orientation_of_a_broad_trial(tmp_path):
+    text = run(
+        "01_orientation.py", data_folder("broad") / "01_undisturbed_slow_rotation_A.mat", "--output", tmp_path
+    )
+    assert figure(text, "total") < 4
+    assert (tmp_path / "orientation.png").stat().st_size > 20_000
+
+
+def test_orientation_of_an_own_csv(tmp_path):
+    write_csv(tmp_path / "own.csv", turning_body(2000))
+    text = run("01_orientation.py", tmp_path / "own.csv", "--preset", "report", "--output", tmp_path / "out")
+    assert "2000 IMU and 2000 magnetometer samples" in text
+    assert figure(text, "total") < 1.5
+    assert (tmp_path / "out/orientation.png").stat().st_size > 20_000
+    assert "no such file" in run("01_orientation.py", tmp_path / "absent.csv", code=1)
+
+
+def test_reading_a_log(tmp_path):
+    r = turning_body(400)
+    write_log(tmp_path / "run.lcm", r, r.q_true_wxyz)
+    text = run("02_read_lcm_log.py", tmp_path / "run.lcm", "--plot", tmp_path / "imu.png")
+    assert "LOC_IMU                 imu_t                      400       1.995      200.00" in text
+    assert (tmp_path / "imu.png").stat().st_size > 20_000
+    assert "absent" in run("02_read_lcm_log.py", tmp_path / "absent", code=1)
