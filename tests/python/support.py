@@ -23,6 +23,15 @@ def data_folder(name: str) -> Path:
     return folder
 
 
+def built_program(name: str) -> Path:
+    """One of the C++ programs, from the build folder LIBLOC_BUILD; skips the test without it."""
+    if "LIBLOC_BUILD" not in os.environ:
+        pytest.skip("LIBLOC_BUILD, the build folder of the C++ programs, is not set")
+    program = Path(os.environ["LIBLOC_BUILD"]) / "tools" / name
+    assert program.is_file(), program
+    return program
+
+
 def to_scipy(q_wxyz: np.ndarray) -> Rotation:
     return Rotation.from_quat(np.roll(np.asarray(q_wxyz), -1, axis=-1))
 

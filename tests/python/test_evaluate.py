@@ -8,8 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from libloc.programs import evaluate
+from libloc.programs.evaluate_input import read_estimate
 from scipy.spatial.transform import Rotation
-from support import CHECKOUT, data_folder, to_scipy, to_wxyz, turning_body, write_csv, write_log
+from support import (
+    CHECKOUT,
+    built_program,
+    data_folder,
+    to_scipy,
+    to_wxyz,
+    turning_body,
+    write_csv,
+    write_log,
+)
 
 import libloc
 
@@ -119,6 +129,46 @@ def test_estimate_in_a_log_against_another_file(tmp_path, capsys):
     assert "log.truncated_bytes" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("form", ["lcm", "csv", "tum"])
+def test_what_loc_estimator_writes(tmp_path, capsys, form):
+    """The C++ program off line: its orientations are those of a batch call bit for bit."""
+    estimator = built_program("loc-estimator")
+    r = turning_body(500)
+    write_csv(tmp_path / "own.csv", r)
+    out = tmp_path / f"out.{form}"
+    subprocess.run(
+        [estimator, "--input", tmp_path / "own.csv", "--output", out], check=True, capture_output=True
+    )
+    got = numbers(capsys, out, "--reference", tmp_path / "own.csv", "--heading", "absolute")
+    assert "position: not compared" in capsys.readouterr().out
+    recording = libloc.read_recording(tmp_path / "own.csv")
+    field = recording.magnetometer.magnetic_field
+    batch = libloc.MadgwickFilter(libloc.MadgwickOptions.robust()).run(r.times_ns, r.gyro, r.force, field)
+    q = batch.q_world_body_wxyz
+    written = read_estimate(out, libloc.ESTIMATE_CHANNEL).q_wxyz
+    assert np.array_equal(written, q) if form != "tum" else np.allclose(written, q, atol=1e-15)
+    expected = libloc.orientation_error(q, recording.reference.q_world_body_wxyz)
+    assert got["orientation"]["total_deg"]["rmse"] == pytest.approx(np.rad2deg(expected.total_rmse), abs=1e-9)
+    assert got["orientation"]["scored"] == 500
+
+
+def test_damaged_csv_of_estimates(tmp_path, capsys):
+    path = tmp_path / "out.csv"
+    heading = "time_ns,qw,qx,qy,qz,px_m,py_m,pz_m,valid"
+    path.write_text(f"{heading}\n0,1,0,0,0,,,,1\n1000000,1,0,0,0,,,,1\n2000000,1,0,")
+    estimate = read_estimate(path, "")
+    assert estimate.counts == {"estimate.read": 2, "estimate.skipped.no_line_end": 1}
+    assert estimate.heading_is_absolute is False
+    for line, text in (
+        ("0,1,0,0,0,,,,x", "'x'"),
+        ("0,1,0,0,0,1", "6 cells"),
+        ("0,2,0,0,0,,,,1", "norm is 2"),
+    ):
+        path.write_text(f"{heading}\n{line}\n")
+        assert evaluate.main([str(path), "--reference", str(DATA / "reference.tum")]) == 1
+        assert text in capsys.readouterr().err
+
+
 def test_time_offset(tmp_path, capsys):
     r = turning_body(300)
     write_csv(tmp_path / "truth.csv", r)
@@ -136,9 +186,7 @@ def test_broad_trial_with_its_own_metric(tmp_path, capsys):
         r.imu.times_ns, r.imu.angular_velocity, r.imu.specific_force, r.magnetometer.magnetic_field,
         r.magnetometer.times_ns).q_world_body_wxyz  # fmt: skip
     libloc.write_tum(tmp_path / "q.tum", libloc.Trajectory(r.imu.times_ns, q, np.zeros((len(q), 3))))
-    got = numbers(
-        capsys, tmp_path / "q.tum", "--reference", trial, "--only", "orientation", "--heading", "absolute"
-    )
+    got = numbers(capsys, tmp_path / "q.tum", "--reference", trial, "--heading", "absolute")
     error = to_scipy(q) * to_scipy(np.nan_to_num(r.reference.q_world_body_wxyz, nan=0.5)).inv()
     scored = r.reference.score & np.isfinite(r.reference.q_world_body_wxyz).all(axis=1)
     rmse = np.sqrt(np.mean(np.rad2deg(error.magnitude()[scored]) ** 2))
@@ -170,11 +218,11 @@ def tum(path: Path, text: str) -> Path:
         ),
         (
             lambda d: [
-                tum(d / "point.tum", "".join(f"{1403715274 + i} 0 0 0 0 0 0 1\n" for i in range(9))),
+                tum(d / "still.tum", "".join(f"{1403715274 + i} 1 0 0 0 0 0 1\n" for i in range(9))),
                 "--reference",
                 DATA / "reference.tum",
             ],
-            "point",
+            "all points are in one place",
         ),
         (lambda d: [d / "run.lcm", "--estimate-channel", "NONE"], "run.lcm: no message on channel NONE"),
         (lambda d: [d / "run.lcm", "--estimate-channel", "LOC_IMU"], "carries imu_t, not estimate_t"),

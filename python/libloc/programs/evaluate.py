@@ -168,6 +168,11 @@ def report(
     options: argparse.Namespace,
 ) -> dict[str, Any]:
     out: dict[str, Any] = {"estimate": describe(estimate), "reference": describe(reference)}
+    out["without_position"] = [
+        name
+        for name, poses in (("estimate", estimate), ("reference", reference))
+        if not poses.has_position().any()
+    ]
     out["time_offset_s"] = options.time_offset
     if orientation:
         error = orientation.error
@@ -239,6 +244,8 @@ def print_report(out: dict[str, Any]) -> None:
         print(f"  {'':24s}{header}")
         row("translation [m]", r["translation_m"])
         row("rotation [deg]", r["rotation_deg"])
+    elif "orientation" in out and out["without_position"]:
+        print(f"position: not compared, the {' and the '.join(out['without_position'])} has none")
 
 
 def make_parser() -> argparse.ArgumentParser:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -71,18 +72,24 @@ def normalised(q: NDArray[np.float64], path: Path) -> NDArray[np.float64]:
         raise DataError(
             f"{path}: orientation {wrong[0]} is not a unit quaternion, its norm is {norm[wrong[0]]}"
         )
-    return np.ascontiguousarray(q / norm[:, None])
+    # What is a unit quaternion to rounding stays as it is, bit for bit.
+    return np.ascontiguousarray(q / np.where(np.abs(norm - 1) < 1e-9, 1.0, norm)[:, None])
 
 
 def _tum(path: Path) -> Poses:
     trajectory, counts = libloc.read_tum(path)
     score = np.ones(len(trajectory), dtype=bool)
+    position = trajectory.position
+    if not position.any():
+        # TUM has no way to leave positions out: this is how orientations alone are written.
+        position[:] = np.nan
+        counts["tum.without_position"] = len(trajectory)
     return Poses(
         path,
         "tum",
         trajectory.times_ns,
         trajectory.q_world_body_wxyz,
-        trajectory.position,
+        position,
         score,
         counts=counts,
     )
@@ -97,7 +104,7 @@ def _in_time_order(times_ns: NDArray[np.int64], counts: dict[str, int], name: st
     return keep
 
 
-def _estimates(path: Path, channel: str) -> Poses:
+def _estimates_of_log(path: Path, channel: str) -> Poses:
     """LOC_ESTIMATE messages of a log."""
     times, q, position, valid, worlds = [], [], [], [], set()
     log = LogReader(path, channels=[channel])
@@ -114,9 +121,59 @@ def _estimates(path: Path, channel: str) -> Poses:
         raise DataError(f"{path}: no message on channel {channel}")
     if len(worlds) > 1 or not worlds <= _Q_ENU_WORLD.keys():
         raise DataError(f"{path}: world of the estimates is {sorted(worlds)}: must be one of ENU, NWU, NED")
-    world = worlds.pop()
     counts = {"estimate.read": len(times)} | {f"log.{name}": value for name, value in log.damage.items()}
-    flags = np.array(valid, dtype=np.int64)
+    return _estimates(path, "lcm", times, q, position, valid, worlds.pop(), counts)
+
+
+_ESTIMATE_COLUMNS = ("time_ns", "qw", "qx", "qy", "qz", "px_m", "py_m", "pz_m", "valid")
+
+
+def _is_estimate_csv(path: Path) -> bool:
+    """CSV as loc-estimator writes it: no recording has a column of valid bits."""
+    with path.open(encoding="utf-8", errors="replace") as file:
+        return set(_ESTIMATE_COLUMNS) <= set(file.readline().strip().split(","))
+
+
+def _estimates_of_csv(path: Path) -> Poses:
+    """Estimates as loc-estimator writes them; what an estimate does not hold is an empty cell."""
+    times, q, position, valid = [], [], [], []
+    counts: dict[str, int] = {}
+    with path.open(encoding="utf-8", newline="") as file:
+        heading = file.readline().strip().split(",")
+        at = [heading.index(name) for name in _ESTIMATE_COLUMNS]
+        for number, line in enumerate(file, start=2):
+            if not line.endswith("\n"):
+                counts["estimate.skipped.no_line_end"] = 1  # cut while it was written
+                break
+            cells = line.strip().split(",")
+            if len(cells) != len(heading):
+                raise DataError(f"{path}:{number}: {len(cells)} cells, the heading has {len(heading)}")
+            try:
+                times.append(int(cells[at[0]]))
+                q.append([float(cells[i] or "nan") for i in at[1:5]])
+                position.append([float(cells[i] or "nan") for i in at[5:8]])
+                valid.append(int(cells[at[8]]))
+            except ValueError as error:
+                raise DataError(f"{path}:{number}: {error}") from None
+    if not times:
+        raise DataError(f"{path}: no estimate in it")
+    return _estimates(
+        path, "estimates", times, q, position, valid, None, {"estimate.read": len(times)} | counts
+    )
+
+
+def _estimates(
+    path: Path,
+    form: str,
+    times: list[int],
+    q: list[Sequence[float]],
+    position: list[Sequence[float]],
+    valid: list[int],
+    world: str | None,
+    counts: dict[str, int],
+) -> Poses:
+    """Poses with what the estimator's valid bits say about them; world None: taken as it is."""
+    times_ns, flags = np.array(times, dtype=np.int64), np.array(valid, dtype=np.int64)
     q_rows = np.array(q, dtype=float)
     q_rows[(flags & EstimateValid.ORIENTATION) == 0] = np.nan
     position_rows = np.array(position, dtype=float)
@@ -131,15 +188,14 @@ def _estimates(path: Path, channel: str) -> Poses:
         score = absolute | ~oriented
         if not score.all():
             counts["estimate.heading_relative"] = int(np.sum(~score))
-    q_enu_world = _Q_ENU_WORLD[world]
-    keep = _in_time_order(np.array(times, dtype=np.int64), counts, "estimate")
-    pose = libloc.Pose3(q_enu_world)
+    q_enu_world = _Q_ENU_WORLD[world or "ENU"]
+    keep = _in_time_order(times_ns, counts, "estimate")
     return Poses(
         path=path,
-        form="lcm",
-        times_ns=np.array(times, dtype=np.int64)[keep],
+        form=form,
+        times_ns=times_ns[keep],
         q_wxyz=multiply(q_enu_world, normalised(q_rows, path))[keep],
-        position=pose.transform(position_rows)[keep],
+        position=libloc.Pose3(q_enu_world).transform(position_rows)[keep],
         score=score[keep],
         heading_is_absolute=bool(absolute[oriented].any()),
         world=world,
@@ -169,11 +225,15 @@ def _reference(path: Path, form: str) -> Poses:
 
 
 def read_estimate(path: Path, channel: str) -> Poses:
-    """TUM trajectory, poses in CSV (or a EuRoC folder's, a BROAD trial's), or estimates in an LCM log."""
+    """Estimates in an LCM log, loc-estimator's CSV, a TUM trajectory; or the reference of a recording."""
     form = libloc.file_format(path)
     if form == "tum":
         return _tum(path)
-    return _estimates(path, channel) if form == "lcm" else _reference(path, form)
+    if form == "lcm":
+        return _estimates_of_log(path, channel)
+    if form == "csv" and _is_estimate_csv(path):
+        return _estimates_of_csv(path)
+    return _reference(path, form)
 
 
 def read_reference(path: Path) -> Poses:
