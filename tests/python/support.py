@@ -83,12 +83,13 @@ def write_log(
     path: Path,
     r: Recording,
     q_estimate: np.ndarray,
-    heading: bool = True,
+    valid: int | np.ndarray = loc.estimate_t.VALID_ORIENTATION | loc.estimate_t.VALID_HEADING,
     world: str = "ENU",
     reference: bool = True,
 ) -> None:
     """An LCM log as loc-live makes it: IMU, estimates (orientation only) and the truth."""
     nan3 = [float("nan")] * 3
+    valid_bits = np.broadcast_to(valid, len(r.times_ns))
     with LogWriter(path) as log:
         for i, time_ns in enumerate(int(t) for t in r.times_ns):
             imu, estimate, truth = loc.imu_t(), loc.estimate_t(), loc.reference_t()
@@ -96,7 +97,7 @@ def write_log(
                 m.time_ns, m.host_time_ns, m.sequence = time_ns, time_ns, i
             imu.angular_velocity, imu.specific_force = list(r.gyro[i]), list(r.force[i])
             estimate.method, estimate.world = "madgwick", world
-            estimate.valid = loc.estimate_t.VALID_ORIENTATION + heading * loc.estimate_t.VALID_HEADING
+            estimate.valid = int(valid_bits[i])
             estimate.q_world_body_wxyz = list(q_estimate[i])
             estimate.position = estimate.velocity = nan3
             truth.q_world_body_wxyz, truth.position, truth.velocity = list(r.q_true_wxyz[i]), nan3, nan3

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import loc
 import numpy as np
 import pytest
 from libloc.programs import evaluate
@@ -85,9 +86,22 @@ def test_log_with_estimate_and_reference(tmp_path, capsys):
     assert "heading compared as it is" in capsys.readouterr().out
 
 
+def test_what_is_not_valid_is_left_out(tmp_path, capsys):
+    r = turning_body(600)
+    q = r.q_true_wxyz.copy()
+    q[:150] = [1, 0, 0, 0]  # before the first estimate, and before the first field
+    valid = np.full(600, loc.estimate_t.VALID_ORIENTATION | loc.estimate_t.VALID_HEADING)
+    valid[:100], valid[100:150] = 0, loc.estimate_t.VALID_ORIENTATION
+    write_log(tmp_path / "run.lcm", r, q, valid=valid)
+    got = numbers(capsys, tmp_path / "run.lcm")
+    assert (got["orientation"]["pairs"], got["orientation"]["scored"]) == (500, 450)
+    assert got["orientation"]["total_deg"]["max"] < 1e-5
+    assert got["estimate"]["counts"]["estimate.heading_relative"] == 50
+
+
 def test_relative_heading_is_removed_and_said(tmp_path, capsys):
     r = turning_body(600)
-    write_log(tmp_path / "run.lcm", r, turned(r, 40.0), heading=False)
+    write_log(tmp_path / "run.lcm", r, turned(r, 40.0), valid=loc.estimate_t.VALID_ORIENTATION)
     got = numbers(capsys, tmp_path / "run.lcm")
     assert got["orientation"]["heading"] == "start"
     assert got["orientation"]["heading_offset_deg"] == pytest.approx(40.0, abs=1e-6)
