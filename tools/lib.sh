@@ -73,13 +73,15 @@ step() {
     "$@" 2>&1 </dev/null | last_line_to_terminal "$label" "$file"
     code=${PIPESTATUS[0]}
   else
+    printf '%s: ' "$label"
     "$@" >"$file" 2>&1 </dev/null
     code=$?
   fi
+  [[ ! -t 1 ]] || printf '%s: ' "$label"
   if ((code == 0)); then
-    say "$label: $((SECONDS - start)) s"
+    say "$((SECONDS - start)) s"
   else
-    say "$label: FAILED after $((SECONDS - start)) s (exit code $code). The end of $file:"
+    say "FAILED after $((SECONDS - start)) s (exit code $code). The end of $file:"
     tail -n "${step_tail_lines:-25}" "$file" | sed 's/^/  | /'
     reason_of_failure "$file"
   fi
