@@ -19,14 +19,12 @@ std::string_view next_word(std::string_view& rest) {
   return word;
 }
 
-StampedPose parse_pose(std::string_view line, const std::string& where) {
+std::pair<TimeNs, Pose3> parse_pose(std::string_view line, const std::string& where) {
   static constexpr std::array<const char*, 7> kNames{"tx", "ty", "tz", "qx", "qy", "qz", "qw"};
   std::string_view rest = line;
-  StampedPose pose;
   const std::string_view time = next_word(rest);
   const auto time_ns = io::parse_time(time, 0);
   if (!time_ns) throw DataError(where + ": '" + std::string(time) + "' is not a time in seconds");
-  pose.time_ns = *time_ns;
   std::array<double, 7> values{};
   for (std::size_t i = 0; i < values.size(); ++i) {
     const std::string_view word = next_word(rest);
@@ -38,47 +36,44 @@ StampedPose parse_pose(std::string_view line, const std::string& where) {
     values[i] = *value;
   }
   if (!io::trim(rest).empty()) throw DataError(where + ": more than 8 columns");
-  pose.T_world_body.translation = {values[0], values[1], values[2]};
   const Eigen::Quaterniond q(values[6], values[3], values[4], values[5]);
   if (!(std::abs(q.norm() - 1) <= 1e-2)) {
     throw DataError(where + ": quaternion with norm " + std::to_string(q.norm()) + ": must be 1");
   }
-  pose.T_world_body.rotation = q.normalized();
-  return pose;
+  return {*time_ns, Pose3(q.normalized(), {values[0], values[1], values[2]})};
 }
 
 }  // namespace
 
-TumTrajectory read_tum(const std::filesystem::path& path) {
+TumFile read_tum(const std::filesystem::path& path) {
   io::LineReader lines(path);
-  TumTrajectory trajectory;
+  TumFile file;
   std::int64_t not_increasing = 0;
   while (const auto line = lines.next()) {
     const std::string_view text = io::trim(*line);
     if (text.empty() || text.starts_with('#')) continue;
-    const StampedPose pose = parse_pose(text, lines.where());
-    if (!trajectory.poses.empty() && pose.time_ns <= trajectory.poses.back().time_ns) {
+    const auto [time_ns, pose] = parse_pose(text, lines.where());
+    if (!file.trajectory.empty() && time_ns <= file.trajectory.times_ns.back()) {
       ++not_increasing;
       continue;
     }
-    trajectory.poses.push_back(pose);
+    file.trajectory.push_back(time_ns, pose);
   }
-  if (trajectory.poses.empty()) throw DataError(path.string() + ": no complete pose in it");
-  trajectory.counts.push_back({"tum.read", static_cast<std::int64_t>(trajectory.poses.size())});
-  if (not_increasing > 0) trajectory.counts.push_back({"tum.skipped.time_not_increasing", not_increasing});
-  if (lines.cut_tail()) trajectory.counts.push_back({"tum.skipped.no_line_end", 1});
-  return trajectory;
+  if (file.trajectory.empty()) throw DataError(path.string() + ": no complete pose in it");
+  file.counts.push_back({"tum.read", static_cast<std::int64_t>(file.trajectory.size())});
+  if (not_increasing > 0) file.counts.push_back({"tum.skipped.time_not_increasing", not_increasing});
+  if (lines.cut_tail()) file.counts.push_back({"tum.skipped.no_line_end", 1});
+  return file;
 }
 
-void write_tum(const std::filesystem::path& path, const std::vector<StampedPose>& poses) {
+void write_tum(const std::filesystem::path& path, const Trajectory& trajectory) {
+  trajectory.check(path.string());
   io::AtomicFile file(path);
   file.stream() << "# timestamp [s] tx ty tz [m] qx qy qz qw, body to world\n";
-  for (const StampedPose& pose : poses) {
-    const Eigen::Vector3d& t = pose.T_world_body.translation;
-    const Eigen::Quaterniond& q = pose.T_world_body.rotation;
-    require(pose.time_ns != kNoTime && t.allFinite() && q.coeffs().allFinite(),
-            "a pose at " + format_seconds(pose.time_ns) + " s is not finite or has no time");
-    std::string line = format_seconds(pose.time_ns);
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    const Eigen::Vector3d& t = trajectory.poses[i].translation;
+    const Eigen::Quaterniond& q = trajectory.poses[i].rotation;
+    std::string line = format_seconds(trajectory.times_ns[i]);
     for (const double value : {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()}) {
       line += ' ';
       io::append_number(line, value);

@@ -208,21 +208,12 @@ void bind_tum(py::module_& m) {
   m.def(
       "read_tum",
       [](const fs::path& path) {
-        const loc::TumTrajectory tum = loc::read_tum(path);
-        loc::Trajectory trajectory;
-        for (const loc::StampedPose& pose : tum.poses) trajectory.push_back(pose.time_ns, pose.T_world_body);
-        return std::pair(std::move(trajectory), as_map(tum.counts));
+        loc::TumFile file = loc::read_tum(path);
+        return std::pair(std::move(file.trajectory), as_map(file.counts));
       },
       py::arg("path"),
       "A trajectory in TUM's format, and what was read and skipped. DataError names file, line and value.");
-  m.def(
-      "write_tum",
-      [](const fs::path& path, const loc::Trajectory& trajectory) {
-        std::vector<loc::StampedPose> poses(trajectory.size());
-        for (std::size_t i = 0; i < poses.size(); ++i) poses[i] = {trajectory.times_ns[i], trajectory.poses[i]};
-        loc::write_tum(path, poses);
-      },
-      py::arg("path"), py::arg("trajectory"), "Writes a trajectory in TUM's format.");
+  m.def("write_tum", &loc::write_tum, py::arg("path"), py::arg("trajectory"), "Writes a trajectory in TUM's format.");
 }
 
 }  // namespace

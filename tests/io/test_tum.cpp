@@ -15,7 +15,7 @@ using test::expect_data_error;
 
 class Tum : public testing::Test {
  protected:
-  TumTrajectory read(const std::string& text) { return read_tum(folder_.write("a.tum", text)); }
+  TumFile read(const std::string& text) { return read_tum(folder_.write("a.tum", text)); }
   void expect_error(const std::string& text, const std::vector<std::string>& parts) {
     expect_data_error([&] { read(text); }, parts);
   }
@@ -23,27 +23,27 @@ class Tum : public testing::Test {
 };
 
 TEST_F(Tum, the_quaternion_is_x_y_z_w) {
-  const auto poses = read("# comment\n1403715274.302142975 1 2 3 0.1 0.2 0.3 0.927361849549570\n").poses;
-  ASSERT_EQ(poses.size(), 1U);
-  EXPECT_EQ(poses[0].time_ns, 1403715274302142975);
-  EXPECT_EQ(poses[0].T_world_body.translation, Eigen::Vector3d(1, 2, 3));
-  EXPECT_NEAR(poses[0].T_world_body.rotation.x(), 0.1, 1e-12);
-  EXPECT_NEAR(poses[0].T_world_body.rotation.w(), 0.92736184954957, 1e-12);
+  const Trajectory read_back = read("# comment\n1403715274.302142975 1 2 3 0.1 0.2 0.3 0.927361849549570\n").trajectory;
+  ASSERT_EQ(read_back.size(), 1U);
+  EXPECT_EQ(read_back.times_ns[0], 1403715274302142975);
+  EXPECT_EQ(read_back.poses[0].translation, Eigen::Vector3d(1, 2, 3));
+  EXPECT_NEAR(read_back.poses[0].rotation.x(), 0.1, 1e-12);
+  EXPECT_NEAR(read_back.poses[0].rotation.w(), 0.92736184954957, 1e-12);
 }
 
 TEST_F(Tum, what_is_written_is_read_to_the_last_bit) {
   Random random(3);
-  std::vector<StampedPose> poses;
-  for (int i = 0; i < 50; ++i)
-    poses.push_back({1403715274302142975 + i * 5'000'001LL, {random.rotation(), random.normal3()}});
+  Trajectory trajectory;
+  for (int i = 0; i < 50; ++i) {
+    trajectory.push_back(1403715274302142975 + i * 5'000'001LL, {random.rotation(), random.normal3()});
+  }
   const auto path = folder_.path() / "b.tum";
-  write_tum(path, poses);
-  const auto back = read_tum(path).poses;
-  ASSERT_EQ(back.size(), poses.size());
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    EXPECT_EQ(back[i].time_ns, poses[i].time_ns);
-    EXPECT_EQ(back[i].T_world_body.translation, poses[i].T_world_body.translation);
-    EXPECT_LT((back[i].T_world_body.rotation.coeffs() - poses[i].T_world_body.rotation.coeffs()).norm(), 3e-16);
+  write_tum(path, trajectory);
+  const Trajectory back = read_tum(path).trajectory;
+  ASSERT_EQ(back.times_ns, trajectory.times_ns);
+  for (std::size_t i = 0; i < back.size(); ++i) {
+    EXPECT_EQ(back.poses[i].translation, trajectory.poses[i].translation);
+    EXPECT_LT((back.poses[i].rotation.coeffs() - trajectory.poses[i].rotation.coeffs()).norm(), 3e-16);
   }
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_.path()), {}), 1) << "nothing temporary is left";
 }
@@ -65,9 +65,9 @@ TEST_F(Tum, errors_name_line_and_value) {
 }
 
 TEST_F(Tum, repeated_and_shuffled_poses_are_counted) {
-  const auto trajectory = read("1 0 0 0 0 0 0 1\r\n1 0 0 0 0 0 0 1\r\n3 0 0 0 0 0 0 1\r\n2 0 0 0 0 0 0 1\r\n");
-  EXPECT_EQ(trajectory.poses.size(), 2U);
-  EXPECT_EQ(count(trajectory.counts, "tum.skipped.time_not_increasing"), 2);
+  const TumFile file = read("1 0 0 0 0 0 0 1\r\n1 0 0 0 0 0 0 1\r\n3 0 0 0 0 0 0 1\r\n2 0 0 0 0 0 0 1\r\n");
+  EXPECT_EQ(file.trajectory.size(), 2U);
+  EXPECT_EQ(count(file.counts, "tum.skipped.time_not_increasing"), 2);
 }
 
 TEST_F(Tum, cut_at_any_byte_gives_an_error_or_a_part) {
@@ -75,10 +75,10 @@ TEST_F(Tum, cut_at_any_byte_gives_an_error_or_a_part) {
   for (std::size_t size = 0; size < text.size(); ++size) {
     SCOPED_TRACE(size);
     try {
-      const auto part = read(text.substr(0, size)).poses;
+      const Trajectory part = read(text.substr(0, size)).trajectory;
       ASSERT_EQ(part.size(), 1U);
-      EXPECT_EQ(part[0].time_ns, 10'500'000'000);
-      EXPECT_EQ(part[0].T_world_body.translation.z(), 3.75);
+      EXPECT_EQ(part.times_ns[0], 10'500'000'000);
+      EXPECT_EQ(part.poses[0].translation.z(), 3.75);
     } catch (const DataError&) {
     }
   }
@@ -86,18 +86,18 @@ TEST_F(Tum, cut_at_any_byte_gives_an_error_or_a_part) {
 }
 
 TEST_F(Tum, a_pose_that_is_not_finite_is_not_written) {
-  StampedPose pose{.time_ns = 1, .T_world_body = {}};
-  pose.T_world_body.translation.x() = std::nan("");
-  EXPECT_THROW(write_tum(folder_.path() / "c.tum", {pose}), std::invalid_argument);
+  Trajectory trajectory;
+  trajectory.push_back(1, {Eigen::Quaterniond::Identity(), {std::nan(""), 0, 0}});
+  EXPECT_THROW(write_tum(folder_.path() / "c.tum", trajectory), DataError);
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "c.tum"));
   EXPECT_THROW(write_tum(folder_.path() / "none" / "c.tum", {}), DataError);
 }
 
 TEST_F(Tum, reads_a_real_trajectory) {
   LOC_DATA_OR_SKIP(file, "euroc-mh01-images/groundtruth.tum");
-  const auto trajectory = read_tum(file);
-  EXPECT_GT(trajectory.poses.size(), 5000U);
-  EXPECT_EQ(trajectory.counts.size(), 1U);
+  const TumFile tum = read_tum(file);
+  EXPECT_GT(tum.trajectory.size(), 5000U);
+  EXPECT_EQ(tum.counts.size(), 1U);
 }
 
 }  // namespace

@@ -6,10 +6,13 @@
 #include <thread>
 
 #include "libloc/core/check.hpp"
+#include "libloc/io/tum.hpp"
 #include "loc/estimate_t.hpp"
 #include "loc/statistics_t.hpp"
+#include "support/temp_folder.hpp"
 #include "tools/support/any_estimator.hpp"
 #include "tools/support/channels.hpp"
+#include "tools/support/estimate_output.hpp"
 #include "tools/support/flow_control.hpp"
 #include "tools/support/input_queues.hpp"
 #include "tools/support/lcm_link.hpp"
@@ -278,6 +281,20 @@ TEST(LcmLink, SaysWhatIsWrongWithTheUrl) {
   } catch (const std::runtime_error& error) {
     EXPECT_NE(std::string(error.what()).find("loc-hub"), std::string::npos) << error.what();
   }
+}
+
+TEST(EstimateOutput, TumKeepsOneTimeLineAndLosesNothingElse) {
+  test::TempFolder folder;
+  const std::string path = (folder.path() / "a.tum").string();
+  const auto output = open_estimate_output(path, "madgwick", "ENU");
+  Estimate estimate;
+  estimate.valid = kValidOrientation;
+  for (const TimeNs time_ns : {TimeNs{10}, TimeNs{20}, TimeNs{5}, TimeNs{30}}) {
+    estimate.time_ns = time_ns;
+    output->write(estimate);
+  }
+  output->finish();
+  EXPECT_EQ(read_tum(path).trajectory.times_ns, (std::vector<TimeNs>{10, 20, 30}));
 }
 
 }  // namespace

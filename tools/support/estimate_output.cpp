@@ -32,10 +32,14 @@ class TumOutput : public EstimateOutput {
       ++without_orientation_;
       return;
     }
+    if (!trajectory_.empty() && estimate.time_ns <= trajectory_.times_ns.back()) {
+      ++time_set_back_;
+      return;
+    }
     const bool position = (estimate.valid & kValidPosition) != 0;
     if (!position) ++without_position_;
-    poses_.push_back({estimate.time_ns,
-                      Pose3(estimate.q_world_body, position ? estimate.position : Eigen::Vector3d::Zero().eval())});
+    trajectory_.push_back(estimate.time_ns,
+                          Pose3(estimate.q_world_body, position ? estimate.position : Eigen::Vector3d::Zero().eval()));
   }
   void finish() override {
     if (without_position_ > 0) {
@@ -45,14 +49,19 @@ class TumOutput : public EstimateOutput {
     if (without_orientation_ > 0) {
       spdlog::warn("event=left_out file=\"{}\" estimates_without_orientation={}", path_, without_orientation_);
     }
-    write_tum(path_, poses_);
+    if (time_set_back_ > 0) {
+      // A trajectory has one time line; CSV and LCM logs hold these estimates.
+      spdlog::warn("event=left_out file=\"{}\" estimates_after_clock_was_set_back={}", path_, time_set_back_);
+    }
+    write_tum(path_, trajectory_);
   }
 
  private:
   std::string path_;
-  std::vector<StampedPose> poses_;
+  Trajectory trajectory_;
   std::int64_t without_position_ = 0;
   std::int64_t without_orientation_ = 0;
+  std::int64_t time_set_back_ = 0;
 };
 
 class LogOutput : public EstimateOutput {
