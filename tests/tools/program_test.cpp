@@ -1,12 +1,12 @@
 #include "program_test.hpp"
 
 #include <gtest/gtest.h>
-#include <stdlib.h>
 #include <sys/poll.h>
 
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>

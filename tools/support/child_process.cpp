@@ -46,6 +46,7 @@ int become(char* const* arguments, int output, pid_t parent) {
 ChildProcess::ChildProcess(std::string name, const std::vector<std::string>& arguments, bool read_output)
     : name_(std::move(name)) {
   std::vector<char*> raw;
+  raw.reserve(arguments.size() + 1);
   // execvp() does not write through it.
   for (const std::string& argument : arguments) raw.push_back(const_cast<char*>(argument.c_str()));
   raw.push_back(nullptr);

@@ -105,7 +105,7 @@ struct Hub::Client {
   bool dead = false;
 };
 
-Hub::Hub(const HubOptions& options) : options_(options), read_buffer_(kReadBytes) {
+Hub::Hub(HubOptions options) : options_(std::move(options)), read_buffer_(kReadBytes) {
   options_.check();
   listener_ = FileDescriptor(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!listener_) fail("socket");
@@ -253,7 +253,7 @@ void Hub::subscribe(Client& client, std::string_view pattern) {
         regex->error_code() == RE2::ErrorBadPerlOp || regex->error_code() == RE2::ErrorBadEscape;
     if (!only_unknown_to_re2) throw DataError("subscription '" + std::string(pattern) + "': " + regex->error());
     if (may_log()) {
-      spdlog::warn("event=pattern_taken_as_all client={} pattern=\"{}\" reason=\"{}\"", client.id, pattern,
+      spdlog::warn(R"(event=pattern_taken_as_all client={} pattern="{}" reason="{}")", client.id, pattern,
                    regex->error());
     }
     regex.reset();
@@ -338,7 +338,7 @@ void Hub::flush(Client& client) {
       break;
     }
     client.queued_bytes -= static_cast<std::size_t>(sent);
-    std::size_t rest = static_cast<std::size_t>(sent);
+    auto rest = static_cast<std::size_t>(sent);
     while (rest > 0) {
       const std::size_t left = client.queue.front()->size() - client.front_sent;
       if (rest < left) {

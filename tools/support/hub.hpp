@@ -49,7 +49,7 @@ struct HubCounts {
 class Hub {
  public:
   /// Listens from here on. @throws std::invalid_argument for the options, std::system_error when it cannot listen.
-  explicit Hub(const HubOptions& options);
+  explicit Hub(HubOptions options);
   Hub(const Hub&) = delete;
   Hub& operator=(const Hub&) = delete;
   ~Hub();

@@ -163,7 +163,7 @@ void LiveEstimator::handle_source_status(const RawMessage& message) {
   }
   if (status.state != source_status_t::STATE_RUNNING) {
     if (!source_ended_) {
-      spdlog::info("event=source_ended source=\"{}\" failed={} message=\"{}\"", status.source,
+      spdlog::info(R"(event=source_ended source="{}" failed={} message="{}")", status.source,
                    status.state == source_status_t::STATE_FAILED, status.message);
     }
     pipeline_.end();
