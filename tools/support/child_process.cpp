@@ -118,7 +118,10 @@ std::optional<std::string> ChildProcess::read_line(TimeNs patience_ns) {
     }
     const TimeNs left = give_up - steady_now();
     pollfd event{output_.get(), POLLIN, 0};
-    if (left <= 0 || ::poll(&event, 1, static_cast<int>(left / 1'000'000) + 1) != 1) return std::nullopt;
+    if (left <= 0) return std::nullopt;
+    const int ready = ::poll(&event, 1, static_cast<int>(left / 1'000'000) + 1);
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready != 1) return std::nullopt;
     std::array<char, 512> part{};
     const ssize_t size = ::read(output_.get(), part.data(), part.size());
     if (size <= 0) return std::nullopt;

@@ -71,6 +71,15 @@ sockaddr_in parse_endpoint(const std::string& text, const Url& url, const char* 
   return out;
 }
 
+// A signal ends no wait here: who asked to stop is heard after it, a second later at most.
+bool wait_for(pollfd& event, int timeout_ms) {
+  int ready = 0;
+  do {
+    ready = ::poll(&event, 1, timeout_ms);
+  } while (ready < 0 && errno == EINTR);
+  return ready == 1;
+}
+
 // liblcm connects without a time limit and takes any server for one of its own: look first.
 std::optional<std::string> why_no_hub(const sockaddr_in& endpoint) {
   FileDescriptor socket(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
@@ -78,7 +87,7 @@ std::optional<std::string> why_no_hub(const sockaddr_in& endpoint) {
   pollfd event{socket.get(), POLLOUT, 0};
   if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&endpoint), sizeof endpoint) != 0) {
     if (errno != EINPROGRESS) return std::generic_category().message(errno);
-    if (::poll(&event, 1, kConnectTimeoutMs) != 1) return "no answer in time";
+    if (!wait_for(event, kConnectTimeoutMs)) return "no answer in time";
     int error = 0;
     socklen_t size = sizeof error;
     ::getsockopt(socket.get(), SOL_SOCKET, SO_ERROR, &error, &size);
@@ -93,7 +102,7 @@ std::optional<std::string> why_no_hub(const sockaddr_in& endpoint) {
   std::size_t got = 0;
   event.events = POLLIN;
   while (got < answer.size()) {
-    if (::poll(&event, 1, kConnectTimeoutMs) != 1) return "it does not greet as an LCM hub does";
+    if (!wait_for(event, kConnectTimeoutMs)) return "it does not greet as an LCM hub does";
     const ssize_t size = ::recv(socket.get(), answer.data() + got, answer.size() - got, 0);
     if (size <= 0) return "it closed the connection";
     got += static_cast<std::size_t>(size);
