@@ -82,8 +82,8 @@ void StreamMerger::accept(Measurement measurement) {
   queue.newest = std::max(queue.newest, time);
   newest_ = std::max(newest_, time);
   // Nearly always at the end; equal times keep their order of arrival.
-  auto place = queue.samples.end();
-  while (place != queue.samples.begin() && time_of(*std::prev(place)) > time) --place;
+  std::size_t place = queue.samples.size();
+  while (place > 0 && time_of(queue.samples[place - 1]) > time) --place;
   queue.samples.insert(place, std::move(measurement));
   ++waiting_;
 }
@@ -156,11 +156,9 @@ std::optional<Measurement> StreamMerger::pop() {
     if (waiting() <= options_.max_samples) return std::nullopt;
     ++counts_.forced;
   }
-  Measurement out = std::move(first->samples.front());
-  first->samples.pop_front();
   --waiting_;
   last_out_ = time;
-  return out;
+  return first->samples.pop_front();
 }
 
 void StreamMerger::finish() {

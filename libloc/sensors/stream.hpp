@@ -15,6 +15,7 @@
 #include <deque>
 #include <optional>
 
+#include "libloc/core/fifo.hpp"
 #include "libloc/sensors/measurements.hpp"
 
 namespace loc {
@@ -55,7 +56,7 @@ class StreamMerger {
 
  private:
   struct Queue {
-    std::deque<Measurement> samples;  // in time order
+    Fifo<Measurement> samples;  // in time order
     TimeNs newest = kNoTime;
     bool awaited = false;
     int late_in_a_row = 0;

@@ -1,4 +1,5 @@
-// No estimator allocates once it is warm: counts the calls of operator new while samples go through.
+// Nothing on the way of a sample to its estimate allocates once it is warm: counts the calls of operator new while
+// samples go through.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -6,6 +7,7 @@
 #include <new>
 
 #include "libloc/estimators/madgwick.hpp"
+#include "libloc/sensors/stream.hpp"
 #include "support/simulated_imu.hpp"
 
 namespace {
@@ -46,6 +48,22 @@ TEST(Allocation, MadgwickDoesNotAllocatePerSample) {
     ASSERT_TRUE(estimate.q_world_body.coeffs().allFinite());
   }
   EXPECT_EQ(allocations, before);
+}
+
+TEST(Allocation, TheStreamMergerKeepsItsMemory) {
+  StreamMerger merger;
+  test::SimulatedImu sim;
+  long warm = 0;
+  int out = 0;
+  for (int i = 0; i < 2000; ++i) {
+    if (i == 200) warm = allocations;
+    sim.step({0.1, 0.2, 0.3});
+    merger.push(sim.imu);
+    if (i % 7 == 0) merger.push(sim.magnetometer);
+    while (merger.pop()) ++out;
+  }
+  EXPECT_EQ(allocations, warm);
+  EXPECT_GT(out, 2000);
 }
 
 }  // namespace
