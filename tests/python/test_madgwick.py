@@ -270,16 +270,20 @@ def test_other_threads_run_meanwhile():
 
 def test_ctrl_c_ends_a_long_run():
     filter_ = MadgwickFilter()
-    main_thread = threading.get_ident()
+    main_thread, over = threading.get_ident(), threading.Event()
 
     def interrupt():
         while not is_running(filter_):
-            pass
+            if over.is_set():
+                return
         signal.pthread_kill(main_thread, signal.SIGINT)
 
     thread = threading.Thread(target=interrupt)
     with pytest.raises(KeyboardInterrupt):
         thread.start()
-        long_run(filter_)
-    thread.join()
+        try:
+            long_run(filter_)
+        finally:
+            over.set()
+            thread.join()
     assert 0 < filter_.counts()["imu.used"] < LONG
