@@ -72,8 +72,8 @@ def normalised(q: NDArray[np.float64], path: Path) -> NDArray[np.float64]:
         raise DataError(
             f"{path}: orientation {wrong[0]} is not a unit quaternion, its norm is {norm[wrong[0]]}"
         )
-    # What is a unit quaternion to rounding stays as it is, bit for bit.
-    return np.ascontiguousarray(q / np.where(np.abs(norm - 1) < 1e-9, 1.0, norm)[:, None])
+    # What the library takes for a unit quaternion stays as it is, bit for bit.
+    return np.ascontiguousarray(q / np.where(np.abs(norm - 1) < 5e-7, 1.0, norm)[:, None])
 
 
 def _tum(path: Path) -> Poses:
