@@ -42,10 +42,10 @@ Eigen::Vector3d rotate(const Eigen::Vector3d& theta, const Eigen::Vector3d& v) {
   return v + first + 0.5 * theta.cross(first);
 }
 
-// One Newton step of 1/sqrt; the square root itself only when the norm is far off.
+// 1/sqrt by its series; the square root itself only when the norm is far off.
 void normalise(Eigen::Quaterniond& q) {
-  const double n2 = q.squaredNorm();
-  q.coeffs() *= std::abs(n2 - 1) < 1e-4 ? 1.5 - 0.5 * n2 : 1 / std::sqrt(n2);
+  const double e = q.squaredNorm() - 1;
+  q.coeffs() *= std::abs(e) < 1e-4 ? 1 - e * (0.5 - 0.375 * e) : 1 / std::sqrt(1 + e);
 }
 
 }  // namespace

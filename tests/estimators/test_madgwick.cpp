@@ -544,7 +544,7 @@ TEST(Madgwick, NoInputMakesTheStateNotFinite) {
         magnetometer.magnetic_field = any3();
         if (random.uniform() < 0.5) filter.update(magnetometer);
         filter.update(imu);
-        ASSERT_NEAR(filter.orientation().norm(), 1, 1e-6) << i;
+        ASSERT_NEAR(filter.orientation().norm(), 1, 1e-12) << i;
         ASSERT_TRUE(filter.gyroscope_bias().allFinite()) << i;
       }
     }
