@@ -14,7 +14,7 @@ namespace loc {
 enum EstimateValid : std::uint32_t {
   kValidOrientation = 1U << 0U,
   kValidHeading =
-      1U << 1U,  ///< The heading is tied to north (magnetometer, GPS); otherwise it is relative to the start.
+      1U << 1U,  ///< The heading is tied to north (magnetometer, GPS), and was lately; otherwise it is relative.
   kValidPosition = 1U << 2U,
   kValidVelocity = 1U << 3U,
   kValidGyroscopeBias = 1U << 4U,
@@ -22,7 +22,7 @@ enum EstimateValid : std::uint32_t {
   kValidCovariance = 1U << 6U,
 };
 
-/// What an estimator did with its last input, and why. Zero is the normal case.
+/// What an estimator did with the input since its last estimate, and why. Zero is the normal case.
 enum EstimateStatus : std::uint32_t {
   kInitialising = 1U << 0U,           ///< No estimate yet.
   kReinitialised = 1U << 1U,          ///< Started anew at this sample (after a gap).
@@ -34,6 +34,7 @@ enum EstimateStatus : std::uint32_t {
   kNotFinite = 1U << 7U,              ///< Input skipped: NaN or infinity.
   kTimeNotIncreasing = 1U << 8U,      ///< Input skipped: its time is not after the last one's.
   kGap = 1U << 9U,                    ///< Time since the last sample is past the limit.
+  kOutOfRange = 1U << 10U,            ///< Input skipped: finite, but more than any sensor reads.
 };
 
 /// Error-state order of the covariance: theta, position, velocity, gyroscope bias, accelerometer bias.
@@ -45,7 +46,7 @@ struct Estimate {
   std::int64_t sequence = -1;     ///< Its sequence number.
   std::uint32_t valid = 0;        ///< EstimateValid
   std::uint32_t status = 0;       ///< EstimateStatus
-  Eigen::Quaterniond q_world_body{1, 0, 0, 0};
+  Eigen::Quaterniond q_world_body{kUnknown, kUnknown, kUnknown, kUnknown};
   Eigen::Vector3d position = Eigen::Vector3d::Constant(kUnknown);  ///< of body in world [m]
   Eigen::Vector3d velocity = Eigen::Vector3d::Constant(kUnknown);  ///< in world [m/s]
   Eigen::Vector3d angular_velocity =

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "libloc/core/check.hpp"
 #include "libloc/geometry/so3.hpp"
@@ -11,8 +12,11 @@
 namespace loc {
 namespace {
 
-// No sensor reads more, and squares and products of such values stay far from overflow. NaN fails the comparison too.
-constexpr double kMaxReading = 1e6;
+// A field of more is no field in any unit, and squares and products stay far from overflow.
+constexpr double kMaxField = 1e6;
+// Samples in a row on another time line that mean: the clock was set back.
+constexpr int kSetBackAfter = 20;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A direction needs a vector; in the unit of the sensor (m/s^2, T or any other that the user's magnetometer has).
 constexpr double kMinForce = 1e-3;
 constexpr double kMinField = 1e-12;
@@ -20,10 +24,6 @@ constexpr double kMinField = 1e-12;
 constexpr double kSaddle = 1e-6;
 // Sine of the angle to gravity below which a magnetic field holds no heading.
 constexpr double kMinHorizontalField = 0.02;
-
-bool usable(const Eigen::Vector3d& v) {
-  return v.squaredNorm() < kMaxReading * kMaxReading;
-}
 
 // q * Exp(theta) for the small angles of one step, without trigonometry; exact to 1e-13 below 0.5 rad.
 Eigen::Quaterniond integrate(const Eigen::Quaterniond& q, const Eigen::Vector3d& theta) {
@@ -119,6 +119,9 @@ void MadgwickOptions::check() const {
   require_positive("magnetic_dip_tolerance", magnetic_dip_tolerance);
   require_positive("magnetic_reference_time_s", magnetic_reference_time_s);
   require_positive("magnetic_max_rejection_s", magnetic_max_rejection_s);
+  require_positive("max_angular_velocity", max_angular_velocity);
+  require_positive("max_specific_force", max_specific_force);
+  require_positive("max_heading_age_s", max_heading_age_s);
   require_positive("max_gap_s", max_gap_s);
   require_positive("max_magnetometer_age_s", max_magnetometer_age_s);
 }
@@ -136,7 +139,7 @@ MadgwickFilter::MadgwickFilter(const MadgwickOptions& options)
       up_z_(options.world == WorldFrame::kNed ? -1 : 1),
       north_axis_(options.world == WorldFrame::kEnu ? 1 : 0),
       cos_dip_tolerance_(std::cos(options.magnetic_dip_tolerance)) {
-  correction_time_s_ = options.beta > 0 ? 0.5 * options.soft_gradient / options.beta : 0;
+  correction_time_s_ = options.beta > 0 ? 0.5 * options.soft_gradient / options.beta : kInfinity;
   bias_variance_.setConstant(options.motion_bias_start_sigma * options.motion_bias_start_sigma);
   options_.check();
 }
@@ -147,22 +150,47 @@ void MadgwickFilter::reset() {
   counts_ = counts;
 }
 
+MadgwickFilter::TimeLine::Verdict MadgwickFilter::TimeLine::judge(TimeNs time) {
+  if (time > last) {
+    refused_in_a_row = 0;
+    last = time;
+    return Verdict::kNext;
+  }
+  refused_in_a_row = refused_in_a_row > 0 && time > refused ? refused_in_a_row + 1 : 1;
+  refused = time;
+  if (refused_in_a_row < kSetBackAfter) return Verdict::kNotIncreasing;
+  refused_in_a_row = 0;
+  last = time;
+  return Verdict::kSetBack;
+}
+
 std::uint32_t MadgwickFilter::skip(std::uint32_t reason) {
-  // The state stays; only the flags of the step are new.
+  // The state stays. The next estimate says that something was skipped before it.
+  skipped_status_ |= reason;
   status_ = reason | (initialised_ ? 0U : static_cast<std::uint32_t>(kInitialising));
   return status_;
 }
 
+void MadgwickFilter::forget_field() {
+  field_sample_time_ = kNoTime;
+  field_judged_time_ = kNoTime;
+  field_disturbed_ = false;
+}
+
 std::uint32_t MadgwickFilter::update(const MagnetometerMeasurement& magnetometer) {
   const Eigen::Vector3d& field = magnetometer.magnetic_field;
-  if (!usable(field)) {
-    ++counts_.magnetometer_not_finite;
-    return kNotFinite;
+  const auto refuse = [this](std::int64_t& count, std::uint32_t reason) {
+    ++count;
+    skipped_status_ |= reason;
+    return reason;
+  };
+  if (!field.allFinite()) return refuse(counts_.magnetometer_not_finite, kNotFinite);
+  if (field.cwiseAbs().maxCoeff() > kMaxField) return refuse(counts_.magnetometer_out_of_range, kOutOfRange);
+  const TimeLine::Verdict verdict = field_time_line_.judge(magnetometer.time_ns);
+  if (verdict == TimeLine::Verdict::kNotIncreasing) {
+    return refuse(counts_.magnetometer_time_not_increasing, kTimeNotIncreasing);
   }
-  if (field_sample_time_ != kNoTime && magnetometer.time_ns <= field_sample_time_) {
-    ++counts_.magnetometer_time_not_increasing;
-    return kTimeNotIncreasing;
-  }
+  if (verdict == TimeLine::Verdict::kSetBack) forget_field();
   ++counts_.magnetometer;
   field_norm_ = field.norm();
   field_ = field_norm_ > kMinField ? Eigen::Vector3d(field / field_norm_) : Eigen::Vector3d::Zero();
@@ -184,6 +212,7 @@ void MadgwickFilter::start(const ImuMeasurement& imu) {
   calm_s_ = 0;
   initialised_ = true;
   heading_known_ = false;
+  since_field_s_ = 0;
 }
 
 void MadgwickFilter::detect_rest(const Eigen::Vector3d& rate, const Eigen::Vector3d& force, double dt) {
@@ -213,20 +242,24 @@ void MadgwickFilter::detect_rest(const Eigen::Vector3d& rate, const Eigen::Vecto
 void MadgwickFilter::update_motion_bias(const Eigen::Vector3d& tilt_rate, const Eigen::Matrix3d& R, double dt) {
   // A gyroscope that reads too much by b makes the attitude turn by R b, and the correction turns back: late by the
   // low-pass of the force and by its own time constant. The same two lags on R give the measurement's matrix:
-  // tilt_rate = -lagged(R) b + noise. (VQF filters R for the same reason: Laidig and Seel, 2023, section 3.4.)
+  // tilt_rate = -lagged(R) b + noise. (VQF filters R for the same reason: Laidig and Seel, 2023.)
   force_lag_R_ += dt / (options_.accelerometer_time_constant_s + dt) * (R - force_lag_R_);
   correction_lag_R_ += dt / (correction_time_s_ + dt) * (force_lag_R_ - correction_lag_R_);
-  if (elapsed_s_ < options_.start_time_s) return;
+  if (elapsed_s_ < options_.start_time_s || correction_time_s_ == kInfinity || (status_ & kAccelerometerIgnored) != 0) {
+    return;  // the correction says nothing about the gyroscope
+  }
   const double walk = options_.motion_bias_walk;
   const double noise = options_.motion_bias_noise;
   const auto H = correction_lag_R_.topRows<2>();
   const Eigen::Vector3d gain = bias_variance_ / (noise * noise + dt * bias_variance_.maxCoeff());
   bias_ -= dt * gain.cwiseProduct(H.transpose() * tilt_rate.head<2>());
   bias_ = bias_.cwiseMax(-options_.max_gyroscope_bias).cwiseMin(options_.max_gyroscope_bias);
-  bias_known_ = true;
   const Eigen::Vector3d seen = H.colwise().squaredNorm().transpose();
   bias_variance_ +=
       dt * (Eigen::Vector3d::Constant(walk * walk) - gain.cwiseProduct(bias_variance_).cwiseProduct(seen));
+  // Known once the deviation has fallen to half of what it was.
+  const double start = options_.motion_bias_start_sigma;
+  if (bias_variance_.maxCoeff() < 0.25 * start * start) bias_known_ = true;
 }
 
 bool MadgwickFilter::agrees(const FieldMean& mean, const FieldMean& sample) const {
@@ -255,8 +288,10 @@ bool MadgwickFilter::magnetic_field_disturbed(double sin_dip, double cos_dip, do
   if (!agrees(candidate_, sample)) candidate_ = {};
   follow(candidate_, sample, dt);
   rejected_s_ += dt;
-  if (candidate_.seen_s < reference_.seen_s && rejected_s_ < options_.magnetic_max_rejection_s) return true;
+  const bool waited_out = rejected_s_ >= options_.magnetic_max_rejection_s;
+  if (candidate_.seen_s < reference_.seen_s && !waited_out) return true;
   reference_ = candidate_;
+  if (waited_out) reference_.seen_s = options_.magnetic_max_rejection_s;  // or what is never steady goes on for ever
   candidate_ = {};
   rejected_s_ = 0;
   return false;
@@ -300,7 +335,7 @@ Eigen::Vector3d MadgwickFilter::gravity_gradient(const Eigen::Matrix3d& R, const
     force_world_ = R * force;
   }
   const double norm2 = force_world_.squaredNorm();
-  if (!(norm2 > kMinForce * kMinForce && force.squaredNorm() > kMinForce * kMinForce)) {
+  if (norm2 < kMinForce * kMinForce) {  // the mean of a fall
     ++counts_.accelerometer_ignored;
     status_ |= kAccelerometerIgnored;
     return Eigen::Vector3d::Zero();
@@ -334,6 +369,7 @@ Eigen::Vector3d MadgwickFilter::magnetic_gradient(const Eigen::Matrix3d& R, cons
       return Eigen::Vector3d::Zero();
     }
   }
+  since_field_s_ = 0;
   // measured x reference, the reference being the measured field turned about the vertical until it points north
   // (report, equations 45, 46).
   const bool north_is_y = north_axis_ == 1;
@@ -352,35 +388,53 @@ Eigen::Vector3d MadgwickFilter::magnetic_gradient(const Eigen::Matrix3d& R, cons
 }
 
 std::uint32_t MadgwickFilter::update(const ImuMeasurement& imu) {
-  if (!usable(imu.angular_velocity) || !usable(imu.specific_force)) {
-    ++counts_.imu_not_finite;
-    return skip(kNotFinite);
+  const double max_rate = options_.max_angular_velocity;
+  if (!(imu.angular_velocity.squaredNorm() <= max_rate * max_rate && imu.specific_force.allFinite())) {
+    const bool finite = imu.angular_velocity.allFinite() && imu.specific_force.allFinite();
+    ++(finite ? counts_.imu_out_of_range : counts_.imu_not_finite);
+    return skip(finite ? kOutOfRange : kNotFinite);
   }
   std::uint32_t status = 0;
   double dt = 0;
-  if (initialised_) {
-    if (imu.time_ns <= last_.time_ns) {
+  switch (imu_time_.judge(imu.time_ns)) {
+    case TimeLine::Verdict::kNotIncreasing:
       ++counts_.imu_time_not_increasing;
       return skip(kTimeNotIncreasing);
-    }
-    TimeNs dt_ns = 0;
-    const bool overflow = __builtin_sub_overflow(imu.time_ns, last_.time_ns, &dt_ns);
-    dt = to_seconds(dt_ns);
-    if (overflow || dt > options_.max_gap_s) {
-      ++counts_.gaps;
+    case TimeLine::Verdict::kSetBack:
+      ++counts_.clock_set_back;
       initialised_ = false;
-      status = kGap | kReinitialised;
-    }
+      status = kReinitialised;
+      if (field_sample_time_ > imu.time_ns) forget_field();
+      break;
+    case TimeLine::Verdict::kNext:
+      if (initialised_) {
+        TimeNs dt_ns = 0;
+        const bool overflow = __builtin_sub_overflow(imu.time_ns, last_.time_ns, &dt_ns);
+        dt = to_seconds(dt_ns);
+        if (overflow || dt > options_.max_gap_s) {
+          ++counts_.gaps;
+          initialised_ = false;
+          status = kGap | kReinitialised;
+          dt = 0;
+        }
+      }
+      break;
   }
-  if (!initialised_ && imu.specific_force.squaredNorm() <= kMinForce * kMinForce) {
+  const double max_force = options_.max_specific_force;
+  const double force2 = imu.specific_force.squaredNorm();
+  const bool has_force = force2 > kMinForce * kMinForce && force2 <= max_force * max_force;
+  if (!initialised_ && !has_force) {
     ++counts_.accelerometer_ignored;
     return skip(status | kAccelerometerIgnored);
   }
   last_ = imu;
-  status_ = status;
+  status_ = status | std::exchange(skipped_status_, 0U);
   ++counts_.imu;
   if (!initialised_) start(imu);
-  if (options_.rest_bias) detect_rest(imu.angular_velocity, imu.specific_force, dt);
+  const bool starting = elapsed_s_ < options_.start_time_s;
+  if (elapsed_s_ < std::max(options_.start_time_s, options_.accelerometer_time_constant_s)) elapsed_s_ += dt;
+  since_field_s_ += dt;
+  if (options_.rest_bias && has_force) detect_rest(imu.angular_velocity, imu.specific_force, dt);
   rate_ = imu.angular_velocity - bias_;
 
   const bool has_field = carry_field(dt);
@@ -394,7 +448,13 @@ std::uint32_t MadgwickFilter::update(const ImuMeasurement& imu) {
   const bool shifted = options_.gradient_phase > 0;
   const Eigen::Vector3d phase = options_.gradient_phase * turn;
   const Eigen::Matrix3d R = q_.toRotationMatrix();
-  Eigen::Vector3d gradient = gravity_gradient(R, shifted ? rotate(phase, imu.specific_force) : imu.specific_force, dt);
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  if (has_force) {
+    gradient = gravity_gradient(R, shifted ? rotate(phase, imu.specific_force) : imu.specific_force, dt);
+  } else {
+    ++counts_.accelerometer_ignored;
+    status_ |= kAccelerometerIgnored;
+  }
   if (has_field) gradient += magnetic_gradient(R, shifted ? rotate(phase, field_) : field_);
   const double size = std::max(gradient.norm(), options_.soft_gradient);
 
@@ -409,8 +469,7 @@ std::uint32_t MadgwickFilter::update(const ImuMeasurement& imu) {
   }
   if (size > 0) {
     Eigen::Vector3d v = weight / size * gradient;
-    if (elapsed_s_ < options_.start_time_s && dt > 0) {
-      elapsed_s_ += dt;
+    if (starting && dt > 0) {
       // While the force has not been averaged yet, attitude and heading follow what it and the field say now; then the
       // mean over all that comes goes on from there.
       const double gain = 0.5 * dt / (std::max(0.0, elapsed_s_ - options_.accelerometer_time_constant_s) + dt);
@@ -447,23 +506,30 @@ Estimate MadgwickFilter::estimate() const {
   estimate.host_time_ns = last_.host_time_ns;
   estimate.sequence = last_.sequence;
   estimate.status = status_;
-  estimate.q_world_body = q_;
-  if (initialised_) estimate.valid |= kValidOrientation;
-  if (heading_known_) estimate.valid |= kValidHeading;
-  if (bias_known_) estimate.valid |= kValidGyroscopeBias;
-  estimate.angular_velocity = rate_;
-  if (bias_known_) estimate.gyroscope_bias = bias_;
+  if (initialised_) {
+    estimate.valid |= kValidOrientation;
+    estimate.q_world_body = q_;
+    estimate.angular_velocity = rate_;
+    if (heading_known_ && since_field_s_ < options_.max_heading_age_s) estimate.valid |= kValidHeading;
+  }
+  if (bias_known_) {
+    estimate.valid |= kValidGyroscopeBias;
+    estimate.gyroscope_bias = bias_;
+  }
   return estimate;
 }
 
 NamedCounts MadgwickFilter::counts() const {
   return {{"imu.used", counts_.imu},
           {"imu.skipped.not_finite", counts_.imu_not_finite},
+          {"imu.skipped.out_of_range", counts_.imu_out_of_range},
           {"imu.skipped.time_not_increasing", counts_.imu_time_not_increasing},
+          {"imu.clock_set_back", counts_.clock_set_back},
           {"imu.gaps", counts_.gaps},
           {"imu.accelerometer_ignored", counts_.accelerometer_ignored},
           {"magnetometer.used", counts_.magnetometer},
           {"magnetometer.skipped.not_finite", counts_.magnetometer_not_finite},
+          {"magnetometer.skipped.out_of_range", counts_.magnetometer_out_of_range},
           {"magnetometer.skipped.time_not_increasing", counts_.magnetometer_time_not_increasing},
           {"magnetometer.ignored", counts_.magnetometer_ignored},
           {"magnetometer.disturbed", counts_.magnetometer_disturbed}};

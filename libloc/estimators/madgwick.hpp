@@ -85,7 +85,10 @@ struct MadgwickOptions {
   double magnetic_reference_time_s = 20;   ///< Time constant with which the reference follows. [s]
   double magnetic_max_rejection_s = 60;  ///< After this long the field is taken for the new normal, steady or not. [s]
 
-  double max_gap_s = 1.0;               ///< A longer time between IMU samples starts the filter anew. [s]
+  double max_angular_velocity = 70;  ///< A sample with more is an error of the sensor: skipped. [rad/s] (4000 deg/s)
+  double max_specific_force = 200;   ///< With more the step goes without the accelerometer. [m/s^2] (20 g)
+  double max_heading_age_s = 60;     ///< So long after the last use of the field the heading still counts as valid. [s]
+  double max_gap_s = 1.0;            ///< A longer time between IMU samples starts the filter anew. [s]
   double max_magnetometer_age_s = 0.5;  ///< Until then a sample is used on, carried along by the gyroscope. [s]
 
   /// The form of the report: beta = 0.1, all extensions off.
@@ -103,18 +106,22 @@ struct MadgwickOptions {
 /// @param scale_error relative scale (and cross-axis) error
 /// @param max_rate angular velocity of the motion that the scale error acts on [rad/s]
 /// @param dt_s time between samples [s]
-/// Source: report, equation 51 (beta = sqrt(3/4) * rate error), the rate error being the root sum of squares of the
+/// Source: report, section 3.6 (beta = sqrt(3/4) * rate error), the rate error being the root sum of squares of the
 /// parts.
 double beta_from_gyro(const ImuNoise& noise, double bias_residual, double scale_error, double max_rate, double dt_s);
 
 struct MadgwickCounts {
-  std::int64_t imu = 0;             ///< samples that made a step
-  std::int64_t magnetometer = 0;    ///< samples taken
-  std::int64_t imu_not_finite = 0;  ///< skipped
+  std::int64_t imu = 0;           ///< samples that made a step
+  std::int64_t magnetometer = 0;  ///< samples taken
+  // skipped
+  std::int64_t imu_not_finite = 0;
+  std::int64_t imu_out_of_range = 0;
   std::int64_t imu_time_not_increasing = 0;
   std::int64_t magnetometer_not_finite = 0;
+  std::int64_t magnetometer_out_of_range = 0;
   std::int64_t magnetometer_time_not_increasing = 0;
   std::int64_t gaps = 0;                    ///< new starts after a gap
+  std::int64_t clock_set_back = 0;          ///< new starts after the clock was set back
   std::int64_t accelerometer_ignored = 0;   ///< steps without
   std::int64_t magnetometer_ignored = 0;    ///< steps whose field is zero or along gravity
   std::int64_t magnetometer_disturbed = 0;  ///< steps whose field was rejected
@@ -125,10 +132,11 @@ class MadgwickFilter {
   /// @throws std::invalid_argument as MadgwickOptions::check.
   explicit MadgwickFilter(const MadgwickOptions& options = {});
 
-  /// One gyroscope and accelerometer sample. @returns EstimateStatus of this step; skipped input leaves the state as it
-  /// was.
+  /// One gyroscope and accelerometer sample. Input that is skipped leaves the state as it was; 20 samples in a row
+  /// whose times increase among themselves, but are not after the last one used, mean that the clock was set back: the
+  /// filter starts anew. @returns EstimateStatus of this sample, and of the samples skipped since the last step.
   std::uint32_t update(const ImuMeasurement& imu);
-  /// Keeps the sample for the next IMU steps. @returns EstimateStatus: kNotFinite, kTimeNotIncreasing or 0.
+  /// Keeps the sample for the next IMU steps. @returns EstimateStatus: 0, or why it is skipped.
   std::uint32_t update(const MagnetometerMeasurement& magnetometer);
 
   /// Estimator concept.
@@ -153,7 +161,18 @@ class MadgwickFilter {
     double seen_s = 0;
   };
 
+  // The time line of one stream.
+  struct TimeLine {
+    TimeNs last = kNoTime;     // used
+    TimeNs refused = kNoTime;  // the last one that was not after it
+    int refused_in_a_row = 0;
+
+    enum class Verdict { kNext, kNotIncreasing, kSetBack };
+    Verdict judge(TimeNs time);
+  };
+
   std::uint32_t skip(std::uint32_t reason);
+  void forget_field();
   void start(const ImuMeasurement& imu);
   void detect_rest(const Eigen::Vector3d& rate, const Eigen::Vector3d& force, double dt);
   void update_motion_bias(const Eigen::Vector3d& tilt_rate, const Eigen::Matrix3d& R, double dt);
@@ -180,6 +199,9 @@ class MadgwickFilter {
   double elapsed_s_ = 0;                                   // since the start
   double force_time_s_ = 0;                                // that force_world_ has averaged over
   std::uint32_t status_ = 0;
+  std::uint32_t skipped_status_ = 0;  // of what was skipped since the last step
+  TimeLine imu_time_;
+  TimeLine field_time_line_;
   Stamp last_;
   bool initialised_ = false;
   bool heading_known_ = false;
@@ -192,6 +214,7 @@ class MadgwickFilter {
   TimeNs field_time_ = kNoTime;         // that field_ is carried to
   TimeNs field_judged_time_ = kNoTime;  // of the last sample that was compared with the reference
   bool field_disturbed_ = false;
+  double since_field_s_ = 0;  // since the field turned the estimate last
 
   // Bias in motion: R behind the lags of the correction.
   Eigen::Matrix3d force_lag_R_ = Eigen::Matrix3d::Identity();

@@ -53,6 +53,8 @@ void StreamMerger::push(Measurement measurement) {
   require(time != kNoTime, "stream: a measurement without time");
   Queue& queue = queues_[queue_of(measurement)];
   queue.awaited = true;
+  if (queue.last_pushed != kNoTime && time < queue.last_pushed) queue.stepped_back = true;
+  queue.last_pushed = time;
   const bool started = newest_ != kNoTime;
   if (started && !finished_ && difference(time, newest_) > options_.max_jump_ns) {
     // Time went on unless it comes back: what was set aside is believed as soon as another sample is there too.
@@ -64,7 +66,7 @@ void StreamMerger::push(Measurement measurement) {
     }
   } else if (started && (time < last_out_ || difference(newest_, time) > options_.max_jump_ns)) {
     doubt_suspects();
-    if (++queue.late_in_a_row < options_.reset_after) {
+    if (!queue.stepped_back || ++queue.late_in_a_row < options_.reset_after) {
       ++counts_.late[measurement.index()];
       return;
     }
@@ -73,6 +75,7 @@ void StreamMerger::push(Measurement measurement) {
     doubt_suspects();
   }
   queue.late_in_a_row = 0;
+  queue.stepped_back = false;
   accept(std::move(measurement));
 }
 
@@ -121,6 +124,7 @@ void StreamMerger::start_anew() {
   for (Queue& queue : queues_) {
     queue.newest = kNoTime;
     queue.late_in_a_row = 0;
+    queue.stepped_back = false;
   }
   last_out_ = kNoTime;
   newest_ = kNoTime;
@@ -163,6 +167,8 @@ std::optional<Measurement> StreamMerger::pop() {
 
 void StreamMerger::finish() {
   finished_ = true;
+  // What others have already passed over is dropped; what came last of all may be right.
+  while (!suspects_.empty() && suspects_.front().others > 0) drop_suspect(0);
   accept_suspects_until(std::numeric_limits<TimeNs>::max());
 }
 

@@ -4,8 +4,9 @@
 // As long as each stream is in order, none is later than max_delay and all are awaited before their first sample, the
 // result does not depend on the order of arrival: live and off line agree.
 //
-// Clocks that jump. Set back: this shows as a run of late samples; after reset_after of them in one stream, all that
-// waits leaves and the sequence starts anew from there (counted; who feeds an estimator resets it then). Set forward, a
+// Clocks that jump. Set back: the times of a stream step back and what follows is late; after reset_after such samples
+// in a row, all that waits leaves and the sequence starts anew from there (counted; who feeds an estimator resets it
+// then). A stream that is only slow is never taken for that: its late samples are counted, however many. Set forward, a
 // pause, or one absurd time: a sample further ahead than max_jump is set aside until another one shows that time really
 // went on (nothing is lost then); it is dropped and counted when reset_after samples arrive that know nothing of it.
 #pragma once
@@ -25,7 +26,7 @@ struct StreamMergerOptions {
   /// A step of time beyond this needs a second sample to be believed; a longer max_delay takes its place.
   TimeNs max_jump_ns = 10'000'000'000;
   std::size_t max_samples = 4096;  ///< Bound on what waits; past it the oldest leaves at once.
-  int reset_after = 20;            ///< Late samples in a row, in one stream, that mean: the clock was set back.
+  int reset_after = 20;            ///< Late samples in a row after a step back, in one stream: the clock was set back.
 };
 
 struct StreamMergerCounts {
@@ -58,8 +59,10 @@ class StreamMerger {
   struct Queue {
     Fifo<Measurement> samples;  // in time order
     TimeNs newest = kNoTime;
+    TimeNs last_pushed = kNoTime;
     bool awaited = false;
-    int late_in_a_row = 0;
+    bool stepped_back = false;  // its time did, and what came since was late
+    int late_in_a_row = 0;      // since then
   };
   // Cameras share times, so each has a queue of its own; those past the last share it.
   static constexpr std::size_t kCameraQueues = 8;

@@ -212,6 +212,11 @@ constexpr OptionField kOptionFields[] = {
      "Time constant with which the reference follows. [s]"},
     {"magnetic_max_rejection_s", &MadgwickOptions::magnetic_max_rejection_s,
      "After this long the field is taken for the new normal. [s]"},
+    {"max_angular_velocity", &MadgwickOptions::max_angular_velocity, "A sample with more is skipped. [rad/s]"},
+    {"max_specific_force", &MadgwickOptions::max_specific_force,
+     "With more the step goes without the accelerometer. [m/s^2]"},
+    {"max_heading_age_s", &MadgwickOptions::max_heading_age_s,
+     "So long after the last use of the field the heading still counts as valid. [s]"},
     {"max_gap_s", &MadgwickOptions::max_gap_s, "A longer time between IMU samples starts the filter anew. [s]"},
     {"max_magnetometer_age_s", &MadgwickOptions::max_magnetometer_age_s,
      "Until then a magnetometer sample is used on. [s]"},
@@ -311,6 +316,7 @@ void bind_estimate(py::module_& m) {
       .value("NOT_FINITE", loc::kNotFinite)
       .value("TIME_NOT_INCREASING", loc::kTimeNotIncreasing)
       .value("GAP", loc::kGap)
+      .value("OUT_OF_RANGE", loc::kOutOfRange)
       .finalize();
   using loc::Estimate;
   py::class_<Estimate>(m, "Estimate", "What an estimator says after one measurement.")

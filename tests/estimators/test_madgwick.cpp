@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "libloc/estimators/madgwick.hpp"
@@ -429,6 +430,15 @@ TEST(Madgwick, FieldAlongGravityOrZeroHasNoHeading) {
   }
 }
 
+// Fails when there is no such count.
+std::int64_t count_of(const MadgwickFilter& filter, const std::string& name) {
+  for (const NamedCount& count : filter.counts()) {
+    if (count.name == name) return count.value;
+  }
+  ADD_FAILURE() << "no count named " << name;
+  return -1;
+}
+
 TEST(Madgwick, SkipsAndCountsBadSamplesAndKeepsItsState) {
   MadgwickFilter filter;
   SimulatedImu sim;
@@ -436,8 +446,7 @@ TEST(Madgwick, SkipsAndCountsBadSamplesAndKeepsItsState) {
   feed(filter, sim);
   sim.step({0.1, 0.2, 0.3});
   const Eigen::Vector4d before = filter.orientation().coeffs();
-  int bad = 0;
-  for (const double value : {kNaN, kInfinity, -kInfinity, 1e7, 1e300}) {
+  for (const double value : {kNaN, kInfinity, -kInfinity}) {
     for (int i = 0; i < 3; ++i) {
       ImuMeasurement imu = sim.imu;
       imu.angular_velocity[i] = value;
@@ -448,28 +457,78 @@ TEST(Madgwick, SkipsAndCountsBadSamplesAndKeepsItsState) {
       MagnetometerMeasurement magnetometer = sim.magnetometer;
       magnetometer.magnetic_field[i] = value;
       EXPECT_EQ(filter.update(magnetometer), static_cast<std::uint32_t>(kNotFinite));
-      bad += 1;
     }
   }
+  for (const double value : {71.0, -1e7, 1e300}) {
+    ImuMeasurement imu = sim.imu;
+    imu.angular_velocity[1] = value;
+    EXPECT_EQ(filter.update(imu), static_cast<std::uint32_t>(kOutOfRange));
+  }
+  MagnetometerMeasurement magnetometer = sim.magnetometer;
+  magnetometer.magnetic_field[1] = 1e7;
+  EXPECT_EQ(filter.update(magnetometer), static_cast<std::uint32_t>(kOutOfRange));
   ImuMeasurement old = sim.imu;
   old.time_ns -= sim.dt_ns;
   EXPECT_EQ(filter.update(old), static_cast<std::uint32_t>(kTimeNotIncreasing));
+  old.time_ns = kNoTime;
+  EXPECT_EQ(filter.update(old), static_cast<std::uint32_t>(kTimeNotIncreasing));
   EXPECT_EQ(filter.orientation().coeffs(), before);
-  for (const NamedCount& count : filter.counts()) {
-    if (count.name == "imu.skipped.not_finite") {
-      EXPECT_EQ(count.value, 2 * bad);
+  EXPECT_EQ(count_of(filter, "imu.skipped.not_finite"), 18);
+  EXPECT_EQ(count_of(filter, "imu.skipped.out_of_range"), 3);
+  EXPECT_EQ(count_of(filter, "imu.skipped.time_not_increasing"), 2);
+  EXPECT_EQ(count_of(filter, "magnetometer.skipped.not_finite"), 9);
+  EXPECT_EQ(count_of(filter, "magnetometer.skipped.out_of_range"), 1);
+  EXPECT_EQ(count_of(filter, "imu.used"), 1);
+  // The next estimate says what was skipped before it, the one after that is clean again.
+  filter.update(sim.imu);
+  EXPECT_EQ(filter.estimate().status, static_cast<std::uint32_t>(kNotFinite) | kOutOfRange | kTimeNotIncreasing);
+  sim.step({0.1, 0.2, 0.3});
+  feed(filter, sim);
+  EXPECT_EQ(filter.estimate().status, 0U);
+}
+
+TEST(Madgwick, ASpikeOfTheAccelerometerDoesNotTilt) {
+  for (const char* preset : {"report", "robust"}) {
+    MadgwickFilter filter(MadgwickOptions::preset(preset));
+    SimulatedImu sim;
+    for (int i = 0; i < 2000; ++i) {
+      sim.step(hand_held_rate(i * 0.005));
+      if (i == 1500) sim.imu.specific_force = {9e5, 0, 0};
+      feed(filter, sim);
+      EXPECT_EQ((filter.status() & kAccelerometerIgnored) != 0, i == 1500);
     }
-    if (count.name == "magnetometer.skipped.not_finite") {
-      EXPECT_EQ(count.value, bad);
-    }
-    if (count.name == "imu.skipped.time_not_increasing") {
-      EXPECT_EQ(count.value, 1);
-    }
-    if (count.name == "imu.used") {
-      EXPECT_EQ(count.value, 1);
-    }
+    EXPECT_LT(error_deg(filter, sim), 0.5) << preset;
+    EXPECT_EQ(count_of(filter, "imu.accelerometer_ignored"), 1);
   }
-  EXPECT_EQ(filter.update(sim.imu), 0U);
+}
+
+TEST(Madgwick, FindsTheNewTimeLineWhenTheClockIsSetBack) {
+  MadgwickFilter filter;
+  SimulatedImu sim;
+  for (int i = 0; i < 100; ++i) {
+    sim.step(hand_held_rate(i * 0.005));
+    feed(filter, sim);
+  }
+  sim.time_ns -= 3'600'000'000'000;
+  int skipped = 0;
+  for (int i = 100; i < 200; ++i) {
+    sim.step(hand_held_rate(i * 0.005));
+    feed(filter, sim);
+    if (filter.status() & kTimeNotIncreasing && !(filter.status() & kReinitialised)) ++skipped;
+  }
+  EXPECT_EQ(skipped, 19);
+  EXPECT_EQ(count_of(filter, "imu.clock_set_back"), 1);
+  EXPECT_LT(error_deg(filter, sim), 1);
+  EXPECT_NE(filter.estimate().valid & kValidHeading, 0U);
+  // One absurd time is no time line: the filter comes back by the same way.
+  ImuMeasurement ahead = sim.imu;
+  ahead.time_ns += 3'600'000'000'000;
+  filter.update(ahead);
+  for (int i = 200; i < 300; ++i) {
+    sim.step(hand_held_rate(i * 0.005));
+    feed(filter, sim);
+  }
+  EXPECT_LT(error_deg(filter, sim), 1);
 }
 
 TEST(Madgwick, FreeFallIsNoDirection) {
@@ -487,21 +546,138 @@ TEST(Madgwick, FreeFallIsNoDirection) {
 }
 
 TEST(Madgwick, StartsAnewAfterAGapButKeepsTheBias) {
+  for (const char* preset : {"report", "robust"}) {
+    MadgwickOptions options = MadgwickOptions::preset(preset);
+    options.rest_bias = true;
+    MadgwickFilter filter(options);
+    SimulatedImu sim;
+    sim.gyroscope_bias = {0.01, 0, 0};
+    for (int i = 0; i < 1000; ++i) {
+      sim.step(Eigen::Vector3d::Zero());
+      feed(filter, sim);
+    }
+    sim.time_ns += 5'000'000'000;
+    sim.q_world_body = Eigen::Quaterniond(Eigen::AngleAxisd(2, Eigen::Vector3d(1, 2, 3).normalized()));
+    // Turning, so that nothing may be integrated over the gap.
+    sim.step({0.5, 0.1, -0.3});
+    feed(filter, sim);
+    EXPECT_EQ(filter.status(), static_cast<std::uint32_t>(kGap) | kReinitialised) << preset;
+    EXPECT_LT(error_deg(filter, sim), 1e-3) << preset;
+    EXPECT_NEAR(filter.gyroscope_bias().x(), 0.01, 1e-6);
+    EXPECT_EQ(count_of(filter, "imu.gaps"), 1);
+  }
+}
+
+TEST(Madgwick, AGapIsNotARest) {
   MadgwickFilter filter(MadgwickOptions::robust());
   SimulatedImu sim;
-  sim.gyroscope_bias = {0.01, 0, 0};
-  for (int i = 0; i < 1000; ++i) {
-    sim.step(Eigen::Vector3d::Zero());
+  for (int i = 0; i < 200; ++i) {
+    sim.step(hand_held_rate(i * 0.005));
     feed(filter, sim);
   }
-  sim.time_ns += 5'000'000'000;
-  sim.q_world_body = Eigen::Quaterniond(Eigen::AngleAxisd(2, Eigen::Vector3d(1, 2, 3).normalized()));
-  sim.step(Eigen::Vector3d::Zero());
+  const Eigen::Vector3d bias = filter.gyroscope_bias();
+  sim.time_ns += 2'000'000'000;
+  sim.step({0.03, 0, 0});
   feed(filter, sim);
-  EXPECT_TRUE(filter.status() & kGap);
-  EXPECT_TRUE(filter.status() & kReinitialised);
-  EXPECT_LT(error_deg(filter, sim), 1e-3);
-  EXPECT_NEAR(filter.gyroscope_bias().x(), 0.01, 1e-6);
+  EXPECT_FALSE(filter.status() & kAtRest);
+  EXPECT_EQ(filter.gyroscope_bias(), bias);
+}
+
+TEST(Madgwick, HeadingIsNotValidForEverWithoutTheField) {
+  MadgwickFilter filter;
+  SimulatedImu sim;
+  for (int i = 0; i < 200 * 80; ++i) {
+    sim.step(hand_held_rate(i * 0.005));
+    if (i < 200) filter.update(sim.magnetometer);
+    filter.update(sim.imu);
+    if (i == 200 * 30) {
+      EXPECT_NE(filter.estimate().valid & kValidHeading, 0U);
+    }
+  }
+  EXPECT_EQ(filter.estimate().valid, static_cast<std::uint32_t>(kValidOrientation));
+}
+
+TEST(Madgwick, NothingIsKnownBeforeTheFirstSample) {
+  const Estimate estimate = MadgwickFilter().estimate();
+  EXPECT_EQ(estimate.valid, 0U);
+  EXPECT_TRUE(estimate.q_world_body.coeffs().array().isNaN().all());
+  EXPECT_TRUE(estimate.angular_velocity.array().isNaN().all());
+}
+
+TEST(Madgwick, ADeadAccelerometerSaysNothingAboutTheBias) {
+  MadgwickFilter filter(MadgwickOptions::robust());
+  SimulatedImu sim;
+  sim.gyroscope_bias.setConstant(0.02);
+  for (int i = 0; i < 200 * 60; ++i) {
+    sim.step(hand_held_rate(i * 0.005));
+    if (i > 0) sim.imu.specific_force.setZero();
+    filter.update(sim.imu);
+  }
+  EXPECT_EQ(filter.estimate().valid & kValidGyroscopeBias, 0U);
+  EXPECT_EQ(filter.gyroscope_bias().norm(), 0);
+}
+
+// Each criterion of rest and of magnetic rejection by itself.
+TEST(Madgwick, RestNeedsACalmGyroscopeAndACalmAccelerometer) {
+  for (const bool shake_gyroscope : {true, false}) {
+    MadgwickFilter filter(MadgwickOptions::robust());
+    SimulatedImu sim;
+    for (int i = 0; i < 2000; ++i) {
+      const double sign = i / 20 % 2 == 0 ? 1 : -1;
+      sim.step(Eigen::Vector3d::Zero());
+      if (shake_gyroscope) {
+        sim.imu.angular_velocity.x() += sign * 0.1;
+      } else {
+        sim.imu.specific_force.x() += sign * 1.5;
+      }
+      filter.update(sim.imu);
+      EXPECT_FALSE(filter.status() & kAtRest);
+    }
+  }
+}
+
+TEST(Madgwick, RejectsByNormAloneAndByDipAlone) {
+  const double dip = std::atan2(40, 20);
+  const std::vector<Eigen::Vector3d> disturbed = {
+      1.2 * Eigen::Vector3d(0, 20e-6, -40e-6),
+      std::sqrt(2000e-12) * Eigen::Vector3d(0, std::cos(dip - 0.25), -std::sin(dip - 0.25))};
+  // With a start that is shorter than the time constant of the force, and with none.
+  for (const double start_time : {5.0, 1.0, 0.0}) {
+    for (const Eigen::Vector3d& field : disturbed) {
+      MadgwickOptions options = MadgwickOptions::robust();
+      options.start_time_s = start_time;
+      MadgwickFilter filter(options);
+      SimulatedImu sim;
+      const Eigen::Vector3d earth = sim.field;
+      for (int i = 0; i < 200 * 40; ++i) {
+        sim.field = i < 200 * 30 ? earth : field;
+        sim.step(hand_held_rate(i * 0.005));
+        feed(filter, sim);
+        ASSERT_EQ((filter.status() & kMagnetometerDisturbed) != 0, i >= 200 * 30) << start_time << " " << i;
+      }
+    }
+  }
+}
+
+TEST(Madgwick, AFieldThatIsNeverSteadyIsAcceptedInTheEnd) {
+  MadgwickOptions options = MadgwickOptions::robust();
+  options.magnetic_max_rejection_s = 10;
+  MadgwickFilter filter(options);
+  SimulatedImu sim;
+  const Eigen::Vector3d earth = sim.field;
+  int rejected = 0;
+  for (int i = 0; i < 200 * 60; ++i) {
+    // After 30 s the norm jumps too far and too often for any candidate.
+    if (i >= 200 * 30) sim.field = earth * (i / 100 % 2 == 0 ? 1.3 : 1.6);
+    sim.step(hand_held_rate(i * 0.005));
+    feed(filter, sim);
+    if (filter.status() & kMagnetometerDisturbed) ++rejected;
+    if (i == 200 * 39) {
+      EXPECT_GT(rejected, 200 * 8);
+    }
+  }
+  EXPECT_GT(rejected, 200 * 9);
+  EXPECT_LT(rejected, 200 * 29);
 }
 
 TEST(Madgwick, ExtremeTimesDoNotOverflow) {

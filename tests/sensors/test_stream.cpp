@@ -365,5 +365,31 @@ TEST(StreamMerger, RefusesBadOptionsAndSamplesWithoutTime) {
   EXPECT_THROW(StreamMerger{options}, std::invalid_argument);
 }
 
+TEST(StreamMerger, AStreamThatIsAlwaysLateIsCountedAndResetsNothing) {
+  // 90 ms behind, where 50 ms are waited for; on another epoch altogether.
+  for (const TimeNs behind : {90'000'000LL, 3'600'000'000'000LL}) {
+    StreamMerger merger;
+    std::int64_t magnetometers = 0;
+    TimeNs last = kNoTime;
+    for (int i = 0; i < 1000; ++i) {
+      ImuMeasurement imu;
+      imu.time_ns = i * 10'000'000LL;
+      merger.push(imu);
+      if (i > 10) {
+        MagnetometerMeasurement magnetometer;
+        magnetometer.time_ns = imu.time_ns - behind;
+        merger.push(magnetometer);
+        ++magnetometers;
+      }
+      while (const auto out = merger.pop()) {
+        ASSERT_GE(stamp_of(*out).time_ns, last);
+        last = stamp_of(*out).time_ns;
+      }
+    }
+    EXPECT_EQ(merger.counts().resets, 0) << behind;
+    EXPECT_GT(merger.counts().late[static_cast<std::size_t>(StreamKind::kMagnetometer)], magnetometers - 20) << behind;
+  }
+}
+
 }  // namespace
 }  // namespace loc
