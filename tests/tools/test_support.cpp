@@ -289,6 +289,7 @@ TEST(EstimateOutput, TumKeepsOneTimeLineAndLosesNothingElse) {
   const auto output = open_estimate_output(path, "madgwick", "ENU");
   Estimate estimate;
   estimate.valid = kValidOrientation;
+  estimate.q_world_body.setIdentity();
   for (const TimeNs time_ns : {TimeNs{10}, TimeNs{20}, TimeNs{5}, TimeNs{30}}) {
     estimate.time_ns = time_ns;
     output->write(estimate);
