@@ -304,8 +304,9 @@ void bind_estimate(py::module_& m) {
       .value("ACCELEROMETER_BIAS", loc::kValidAccelerometerBias)
       .value("COVARIANCE", loc::kValidCovariance)
       .finalize();
-  py::native_enum<loc::EstimateStatus>(m, "EstimateStatus", "enum.IntFlag",
-                                       "What an estimator did with its last input, and why. 0 is the normal case.")
+  py::native_enum<loc::EstimateStatus>(
+      m, "EstimateStatus", "enum.IntFlag",
+      "What an estimator did with the input since its last estimate, and why; 0 is normal.")
       .value("INITIALISING", loc::kInitialising)
       .value("REINITIALISED", loc::kReinitialised)
       .value("AT_REST", loc::kAtRest)
