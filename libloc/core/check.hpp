@@ -2,6 +2,8 @@
 // value.
 #pragma once
 
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -15,6 +17,13 @@ class DataError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Shortest text that reads back as the same double: std::to_string() gives -1e-9 as -0.000000.
+inline std::string to_text(double value) {
+  std::array<char, 32> buffer{};
+  const auto result = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
+  return {buffer.data(), result.ptr};
+}
+
 /// @throws std::invalid_argument saying what, unless ok.
 inline void require(bool ok, std::string_view what) {
   if (!ok) throw std::invalid_argument(std::string(what));
@@ -23,7 +32,7 @@ inline void require(bool ok, std::string_view what) {
 /// @throws std::invalid_argument "name = value: rule", unless ok.
 inline void require(bool ok, std::string_view name, double value, std::string_view rule) {
   if (!ok) {
-    throw std::invalid_argument(std::string(name) + " = " + std::to_string(value) + ": " + std::string(rule));
+    throw std::invalid_argument(std::string(name) + " = " + to_text(value) + ": " + std::string(rule));
   }
 }
 

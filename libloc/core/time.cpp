@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "libloc/core/check.hpp"
+
 namespace loc {
 namespace {
 
@@ -19,7 +21,7 @@ TimeNs from_seconds(double seconds) {
   const double ns = seconds * 1e9;
   // 2^63 is exact in a double; the comparison is false for NaN.
   if (!(std::abs(ns) < 9.2233720368547758e18)) {
-    throw std::invalid_argument("not a time in seconds: " + std::to_string(seconds));
+    throw std::invalid_argument("not a time in seconds: " + to_text(seconds));
   }
   return static_cast<TimeNs>(std::llround(ns));
 }
@@ -34,7 +36,7 @@ TimeNs parse_seconds(std::string_view text) {
   int exponent = 0;
   if (const auto e = rest.find_first_of("eE"); e != std::string_view::npos) {
     std::string_view digits = rest.substr(e + 1);
-    if (!digits.empty() && digits.front() == '+') digits.remove_prefix(1);
+    if (digits.starts_with('+') && !digits.starts_with("+-")) digits.remove_prefix(1);
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), exponent);
     if (error != std::errc{} || end != digits.data() + digits.size() || exponent < -40 || exponent > 40) {
       reject(text);

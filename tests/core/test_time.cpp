@@ -20,8 +20,8 @@ TEST(Time, ParsesSecondsExactlyWhereADoubleCannot) {
 }
 
 TEST(Time, RefusesWhatIsNoTime) {
-  for (const char* text :
-       {"", ".", "-", "nan", "1.2.3", "1e", "1e99", "12 ", "1e-2147483648", "0x10", "99999999999999"}) {
+  for (const char* text : {"", ".", "-", "nan", "1.2.3", "1e", "1e99", "1e+-5", "1e-+5", "1e++5", "+-1", "12 ",
+                           "1e-2147483648", "0x10", "99999999999999"}) {
     EXPECT_THROW(parse_seconds(text), std::invalid_argument) << text;
   }
   EXPECT_THROW(from_seconds(std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);
