@@ -89,10 +89,10 @@ Terms terms_of(const Message& m, const std::vector<double>& values, bool attitud
     for (std::size_t j = 0; j < measured.size(); ++j) terms.cov(measured[i], measured[j]) = m.covariance[i][j];
   }
   if (!std::isnan(values[0]) && !(std::abs(values[0]) <= std::numbers::pi / 2)) {
-    throw DataError(name + ": latitude = " + std::to_string(values[0]) + " rad: must be in [-pi/2, pi/2]");
+    throw DataError(name + ": latitude = " + to_text(values[0]) + " rad: must be in [-pi/2, pi/2]");
   }
   if (!std::isnan(values[1]) && !(std::abs(values[1]) <= 2 * std::numbers::pi)) {
-    throw DataError(name + ": longitude = " + std::to_string(values[1]) + " rad: must be in [-2 pi, 2 pi]");
+    throw DataError(name + ": longitude = " + to_text(values[1]) + " rad: must be in [-2 pi, 2 pi]");
   }
   return terms;
 }
@@ -207,7 +207,7 @@ ReferenceMeasurement ReferenceConverter::convert(std::span<const std::uint8_t> d
   const Terms terms = terms_of(m);
   const Eigen::Quaterniond q_ned_body(m.quaternion[0], m.quaternion[1], m.quaternion[2], m.quaternion[3]);
   if (has_attitude(m) && !(std::abs(q_ned_body.norm() - 1) <= 1e-2)) {
-    throw DataError("measurement_position_velocity_attitude.quaternion: norm = " + std::to_string(q_ned_body.norm()) +
+    throw DataError("measurement_position_velocity_attitude.quaternion: norm = " + to_text(q_ned_body.norm()) +
                     ": must be 1");
   }
 

@@ -1,6 +1,8 @@
 #include "msgs/convert.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "libloc/core/check.hpp"
 
@@ -14,9 +16,13 @@ void stamp_to(const Stamp& stamp, Message& m) {
   m.sequence = stamp.sequence;
 }
 
+void require_time(std::int64_t time_ns, const char* type, const char* what) {
+  if (time_ns == kNoTime) throw DataError(std::string(type) + ".time_ns = INT64_MIN: " + what + " must have a time");
+}
+
 template <class Message>
 void stamp_from(const Message& m, const char* type, Stamp& stamp) {
-  if (m.time_ns == kNoTime) throw DataError(std::string(type) + ".time_ns = INT64_MIN: a measurement must have a time");
+  require_time(m.time_ns, type, "a measurement");
   stamp.time_ns = m.time_ns;
   stamp.host_time_ns = m.host_time_ns;
   stamp.sequence = m.sequence;
@@ -54,6 +60,24 @@ void quaternion_to(const Eigen::Quaterniond& q, double* wxyz) {
 
 Eigen::Quaterniond quaternion_from(const double* wxyz) {
   return {wxyz[0], wxyz[1], wxyz[2], wxyz[3]};
+}
+
+// What a program sent is kept to the last bit; what was rounded on its way is normalised.
+Eigen::Quaterniond unit_quaternion_from(const double* wxyz, const char* field) {
+  constexpr double kRounded = 1e-2;
+  constexpr double kExact = 1e-9;
+  Eigen::Quaterniond q = quaternion_from(wxyz);
+  const double off = std::abs(q.norm() - 1);
+  if (!(off <= kRounded)) throw DataError(std::string(field) + ": norm = " + to_text(q.norm()) + ": must be 1");
+  if (off > kExact) q.normalize();
+  return q;
+}
+
+// NaN passes: what the receiver did not say.
+void require_angle(const char* field, double value, double largest, const char* range) {
+  if (std::abs(value) > largest) {
+    throw DataError(std::string(field) + " = " + to_text(value) + ": must be in radians, " + range);
+  }
 }
 
 [[noreturn]] void reject(const char* field, std::int64_t value, const char* rule) {
@@ -187,6 +211,8 @@ ImageMeasurement from_message(const image_t& m) {
   } else if (m.size == 0) {
     reject("image_t.size", m.size, "must be positive");
   }
+  if (m.camera < 0) reject("image_t.camera", m.camera, "must not be negative");
+  if (m.exposure_ns < 0) reject("image_t.exposure_ns", m.exposure_ns, "must not be negative");
   out.camera = m.camera;
   out.width_px = m.width;
   out.height_px = m.height;
@@ -203,6 +229,8 @@ GpsMeasurement from_message(const gps_fix_t& m) {
   if (m.fix_type < gps_fix_t::FIX_NONE || m.fix_type > gps_fix_t::FIX_FIXED) {
     reject("gps_fix_t.fix_type", m.fix_type, "is not one of the fix types");
   }
+  require_angle("gps_fix_t.latitude", m.latitude, std::numbers::pi / 2, "[-pi/2, pi/2]");
+  require_angle("gps_fix_t.longitude", m.longitude, 2 * std::numbers::pi, "[-2 pi, 2 pi]");
   out.fix = static_cast<GpsFixType>(m.fix_type);
   out.satellites = m.satellites;
   out.gps_time_ns = m.gps_time_ns;
@@ -218,7 +246,9 @@ GpsMeasurement from_message(const gps_fix_t& m) {
 ReferenceMeasurement from_message(const reference_t& m) {
   ReferenceMeasurement out;
   stamp_from(m, "reference_t", out);
-  out.q_world_body = quaternion_from(m.q_world_body_wxyz);
+  const Eigen::Quaterniond q = quaternion_from(m.q_world_body_wxyz);
+  out.q_world_body =
+      q.coeffs().hasNaN() ? q : unit_quaternion_from(m.q_world_body_wxyz, "reference_t.q_world_body_wxyz");
   out.position = vector_from(m.position);
   out.velocity = vector_from(m.velocity);
   out.score = m.score != 0;
@@ -227,12 +257,15 @@ ReferenceMeasurement from_message(const reference_t& m) {
 
 Estimate from_message(const estimate_t& m) {
   Estimate out;
+  require_time(m.time_ns, "estimate_t", "an estimate");
   out.time_ns = m.time_ns;
   out.host_time_ns = m.host_time_ns;
   out.sequence = m.sequence;
   out.valid = static_cast<std::uint32_t>(m.valid);
   out.status = static_cast<std::uint32_t>(m.status);
-  out.q_world_body = quaternion_from(m.q_world_body_wxyz);
+  out.q_world_body = (out.valid & kValidOrientation) != 0
+                         ? unit_quaternion_from(m.q_world_body_wxyz, "estimate_t.q_world_body_wxyz")
+                         : quaternion_from(m.q_world_body_wxyz);
   out.position = vector_from(m.position);
   out.velocity = vector_from(m.velocity);
   out.angular_velocity = vector_from(m.angular_velocity);
@@ -240,6 +273,20 @@ Estimate from_message(const estimate_t& m) {
   out.accelerometer_bias = vector_from(m.accelerometer_bias);
   if (m.covariance_dim < 0 || m.covariance_dim > kMaxEstimateDim) {
     reject("estimate_t.covariance_dim", m.covariance_dim, "must be in [0, 15]");
+  }
+  if ((out.valid & kValidCovariance) != 0 && m.covariance_dim == 0) {
+    reject("estimate_t.covariance_dim", 0, "must be positive, as the bit VALID_COVARIANCE is set");
+  }
+  // A message that was decoded has them; one that a program has put together may not.
+  const auto dim = static_cast<std::size_t>(m.covariance_dim);
+  const std::string expected = " where covariance_dim = " + std::to_string(dim);
+  if (m.covariance.size() != dim) {
+    throw DataError("estimate_t.covariance: " + std::to_string(m.covariance.size()) + " rows" + expected);
+  }
+  for (std::size_t i = 0; i < dim; ++i) {
+    if (m.covariance[i].size() == dim) continue;
+    throw DataError("estimate_t.covariance[" + std::to_string(i) + "]: " + std::to_string(m.covariance[i].size()) +
+                    " values" + expected);
   }
   out.covariance_dim = m.covariance_dim;
   for (int i = 0; i < m.covariance_dim; ++i) {

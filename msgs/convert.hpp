@@ -1,6 +1,8 @@
 // Between the LCM types (package loc) and the plain structs of libloc: the only place that knows both.
 // from_message() throws DataError, naming the field and its value, for what no sensor can have sent (a size that does
-// not match, a time that is not set); NaN in a measurement passes, because estimators count and report it themselves.
+// not match, a time that is not set, a latitude in degrees, a quaternion whose norm is farther than 1e-2 from 1; within
+// that it is normalised, within 1e-9 it is kept bit for bit). NaN in a measurement passes, because estimators count and
+// report it themselves.
 #pragma once
 
 #include <string>

@@ -1,10 +1,12 @@
 // The message types: fingerprints are frozen, conversions lose nothing, wrong bytes are refused.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <functional>
 #include <limits>
+#include <numbers>
 
 #include "libloc/core/check.hpp"
 #include "libloc/core/random.hpp"
@@ -153,13 +155,13 @@ TEST(Messages, ReferenceRoundTripKeepsTheOrderOfTheQuaternion) {
   ReferenceMeasurement reference;
   Random random(6);
   fill_stamp(random, reference);
-  reference.q_world_body = Eigen::Quaterniond(0.1, 0.2, 0.3, 0.4);
+  reference.q_world_body = Eigen::Quaterniond(0.1, 0.2, 0.3, 0.4).normalized();
   reference.position = any_vector(random);
   reference.velocity = any_vector(random);
   reference.score = false;
   const reference_t message = over_the_wire(to_message(reference));
-  EXPECT_EQ(message.q_world_body_wxyz[0], 0.1);
-  EXPECT_EQ(message.q_world_body_wxyz[3], 0.4);
+  EXPECT_EQ(message.q_world_body_wxyz[0], reference.q_world_body.w());
+  EXPECT_EQ(message.q_world_body_wxyz[3], reference.q_world_body.z());
   const ReferenceMeasurement back = from_message(message);
   expect_same_stamp(reference, back);
   EXPECT_EQ(back.q_world_body.coeffs(), reference.q_world_body.coeffs());
@@ -228,6 +230,93 @@ void expect_data_error(const std::function<void()>& action, const std::string& f
   }
 }
 
+template <class Message, class Change>
+Message changed(Message message, Change change) {
+  change(message);
+  return message;
+}
+
+GpsMeasurement any_fix() {
+  GpsMeasurement gps;
+  gps.time_ns = 1;
+  gps.fix = GpsFixType::k3d;
+  gps.latitude = 0.6;
+  gps.longitude = -1.5;
+  return gps;
+}
+
+TEST(Messages, DegreesInPlaceOfRadiansAreRefused) {
+  const gps_fix_t good = to_message(any_fix());
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const auto at = [&](double latitude, double longitude) {
+    return from_message(changed(good, [&](gps_fix_t& m) {
+      m.latitude = latitude;
+      m.longitude = longitude;
+    }));
+  };
+  EXPECT_EQ(at(std::numbers::pi / 2, 2 * std::numbers::pi).latitude, std::numbers::pi / 2);
+  EXPECT_EQ(at(-std::numbers::pi / 2, -2 * std::numbers::pi).longitude, -2 * std::numbers::pi);
+  EXPECT_TRUE(std::isnan(at(kNan, kNan).latitude)) << "no fix yet";
+  expect_data_error([&] { at(48.25, 0.2); }, "gps_fix_t.latitude = 48.25: must be in radians, [-pi/2, pi/2]");
+  expect_data_error([&] { at(0.8, -11.5); }, "gps_fix_t.longitude = -11.5: must be in radians, [-2 pi, 2 pi]");
+  expect_data_error([&] { at(0.8, 11.5); }, "gps_fix_t.longitude");
+  expect_data_error([&] { at(-1.58, 0); }, "gps_fix_t.latitude");
+  expect_data_error([&] { at(std::numeric_limits<double>::infinity(), 0); }, "gps_fix_t.latitude = inf");
+}
+
+TEST(Messages, QuaternionsAreNormalisedOrRefused) {
+  Random random(8);
+  ReferenceMeasurement reference;
+  reference.time_ns = 1;
+  const auto back = [&] { return from_message(over_the_wire(to_message(reference))).q_world_body; };
+  for (int i = 0; i < 1000; ++i) {
+    const Eigen::Quaterniond q = random.rotation();
+    reference.q_world_body = q;
+    EXPECT_EQ(back().coeffs(), q.coeffs()) << "a unit quaternion stays as it is";
+    reference.q_world_body.coeffs() = q.coeffs() * random.uniform(0.991, 1.009);
+    EXPECT_LT((back().coeffs() - q.coeffs()).norm(), 1e-15);
+  }
+  reference.q_world_body.coeffs() *= 1.02;
+  reference.q_world_body.normalize();
+  reference.q_world_body.coeffs() *= 0.5;
+  expect_data_error([&] { back(); }, "reference_t.q_world_body_wxyz: norm = 0.5");
+  reference.q_world_body.coeffs().setZero();
+  expect_data_error([&] { back(); }, "reference_t.q_world_body_wxyz: norm = 0");
+  reference.q_world_body.w() = std::numeric_limits<double>::infinity();
+  expect_data_error([&] { back(); }, "norm = inf");
+  reference.q_world_body.coeffs().setConstant(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_TRUE(back().coeffs().array().isNaN().all()) << "a reference of positions only";
+}
+
+TEST(Messages, EstimatesThatContradictThemselvesAreRefused) {
+  Estimate estimate;
+  estimate.time_ns = 42;
+  estimate.valid = kValidOrientation | kValidCovariance;
+  estimate.q_world_body = Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5);
+  estimate.covariance.setIdentity();
+  estimate.covariance_dim = 3;
+  const estimate_t good = to_message(estimate, "madgwick", "ENU");
+  EXPECT_NO_THROW(from_message(good));
+  const auto refused = [&](auto change, const std::string& what) {
+    expect_data_error([&] { from_message(changed(good, change)); }, what);
+  };
+  refused([](estimate_t& m) { m.time_ns = kNoTime; }, "estimate_t.time_ns");
+  refused([](estimate_t& m) { m.q_world_body_wxyz[0] = 0.6; }, "estimate_t.q_world_body_wxyz: norm = 1.0");
+  refused([](estimate_t& m) { m.q_world_body_wxyz[2] = std::nan(""); }, "estimate_t.q_world_body_wxyz: norm = nan");
+  refused([](estimate_t& m) { m.covariance_dim = 0; }, "estimate_t.covariance_dim = 0");
+  refused([](estimate_t& m) { m.covariance_dim = -1; }, "estimate_t.covariance_dim = -1");
+  refused([](estimate_t& m) { m.covariance_dim = 2; }, "estimate_t.covariance: 3 rows");
+  refused([](estimate_t& m) { m.covariance.pop_back(); }, "estimate_t.covariance: 2 rows");
+  refused([](estimate_t& m) { m.covariance[1].pop_back(); }, "estimate_t.covariance[1]: 2 values");
+  // What the bits say is not there may be anything.
+  EXPECT_NO_THROW(from_message(changed(good, [](estimate_t& m) {
+    m.valid = 0;
+    std::ranges::fill(m.q_world_body_wxyz, std::nan(""));
+    m.covariance_dim = 0;
+    m.covariance.clear();
+  })));
+}
+
 TEST(Messages, RefusesWhatNoSensorCanHaveSent) {
   ImuMeasurement imu;
   imu.time_ns = 1;
@@ -254,12 +343,15 @@ TEST(Messages, RefusesWhatNoSensorCanHaveSent) {
   expect_data_error([&] { from_message(with([](image_t& m) { m.height = 2'000'000'000; })); }, "size");
   expect_data_error([&] { from_message(with([](image_t& m) { m.size = 17; })); }, "size");
   expect_data_error([&] { from_message(with([](image_t& m) { m.pixelformat = 7; })); }, "pixelformat");
+  expect_data_error([&] { from_message(with([](image_t& m) { m.camera = -1; })); }, "image_t.camera = -1");
+  expect_data_error([&] { from_message(with([](image_t& m) { m.exposure_ns = -5; })); }, "image_t.exposure_ns = -5");
 
   gps_fix_t fix{};
   fix.fix_type = 9;
   expect_data_error([&] { from_message(fix); }, "fix_type");
 
   estimate_t estimate{};
+  estimate.time_ns = 1;
   estimate.covariance_dim = 16;
   expect_data_error([&] { from_message(estimate); }, "covariance_dim");
 }
