@@ -10,6 +10,7 @@
 #include <string>
 
 #include "libloc/core/check.hpp"
+#include "libloc/io/text_file.hpp"
 
 namespace loc {
 namespace {
@@ -27,11 +28,10 @@ using Variable = std::unique_ptr<matvar_t, FreeVariable>;
 // matio fills what a cut file lacks with zeros and says nothing, so the lengths of the elements are added up first.
 void check_whole(const std::filesystem::path& path) {
   constexpr std::uint64_t kHeaderBytes = 128;
-  std::error_code error;
-  if (!std::filesystem::exists(path, error)) throw DataError(path.string() + ": no such file");
-  const std::uint64_t size = std::filesystem::file_size(path, error);
+  if (!std::filesystem::exists(io::status_of(path))) throw DataError(path.string() + ": no such file");
+  const std::uint64_t size = io::size_of(path);
   std::ifstream file(path, std::ios::binary);
-  if (error || !file) throw DataError(path.string() + ": cannot be read");
+  if (!file) throw DataError(path.string() + ": cannot be read");
   std::array<unsigned char, kHeaderBytes> header{};
   file.read(reinterpret_cast<char*>(header.data()), kHeaderBytes);
   if (!file || header[124] != 0 || header[125] != 1 || header[126] != 'I' || header[127] != 'M') {
@@ -181,7 +181,7 @@ BroadTrial read_broad_trial(const std::filesystem::path& path) {
   BroadTrial trial;
   trial.rate_hz = file.matrix("sampling_rate", 1, 1)(0, 0);
   if (!(std::isfinite(trial.rate_hz) && trial.rate_hz > 0)) {
-    throw DataError(path.string() + ": sampling_rate = " + std::to_string(trial.rate_hz) + ": must be positive");
+    throw DataError(path.string() + ": sampling_rate = " + to_text(trial.rate_hz) + ": must be positive");
   }
   trial.angular_velocity = file.matrix("imu_gyr", -1, 3);
   const Eigen::Index n = trial.angular_velocity.rows();

@@ -1,5 +1,6 @@
 // The files of Kalibr and of EuRoC that hold parts of a rig; declared in rig_yaml.hpp.
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
 #include "libloc/io/rig_yaml.hpp"
@@ -10,6 +11,8 @@ namespace loc {
 namespace {
 
 using io::YamlBlock;
+
+constexpr double kIdentityTolerance = 1e-9;  // [rad], [m]
 
 Pose3 pose_from(YamlBlock& block, const char* key, const Eigen::Matrix4d& m) {
   try {
@@ -108,6 +111,15 @@ std::vector<CameraCalibration> read_kalibr_camchain(const std::filesystem::path&
     }
     rig.cameras.push_back(camera);
   }
+  // A camera that the numbers do not lead to would be lost in silence.
+  for (const std::string& key : file.keys()) {
+    const bool camera =
+        key.size() > 3 && key.starts_with("cam") && key.find_first_not_of("0123456789", 3) == std::string::npos;
+    const bool read = std::ranges::any_of(rig.cameras, [&](const CameraCalibration& c) { return c.name == key; });
+    if (camera && !read && !rig.cameras.empty()) {
+      file.fail(key.c_str(), "is out of order: there is no cam" + std::to_string(rig.cameras.size()));
+    }
+  }
   if (rig.cameras.empty()) throw DataError(path.string() + ": no cam0: not a camchain of Kalibr");
   return checked(path, std::move(rig)).cameras;
 }
@@ -115,6 +127,19 @@ std::vector<CameraCalibration> read_kalibr_camchain(const std::filesystem::path&
 ImuCalibration read_kalibr_imu(const std::filesystem::path& path) {
   YamlBlock file = YamlBlock::load(path, false);
   YamlBlock block = file.has("imu0") ? file.block("imu0") : file;
+  // What a calibration of scales, axes and place found and this struct does not hold must not be lost in silence.
+  if (block.has("model") && block.text("model") != "calibrated") {
+    block.fail("model", "= '" + block.text("model") + "': only calibrated is read");
+  }
+  for (const char* key : {"accelerometers", "gyroscopes"}) {
+    if (block.has(key)) block.fail(key, "is not read: only the model calibrated is");
+  }
+  if (block.has("T_i_b") && pose_from(block, "T_i_b", block.matrix("T_i_b", 4, 4)).log().norm() > kIdentityTolerance) {
+    block.fail("T_i_b", "must be the identity: body is the IMU");
+  }
+  if (block.has("time_offset") && block.number("time_offset") != 0) {
+    block.fail("time_offset", "must be 0: times are those of the IMU");
+  }
   Rig rig;
   rig.imu.emplace();
   read_noise(block, rig.imu->noise);
@@ -193,7 +218,7 @@ ImuCalibration read_euroc_imu(const std::filesystem::path& path) {
   YamlBlock file = YamlBlock::load(path, false);
   if (file.text("sensor_type") != "imu") file.fail("sensor_type", "must be imu");
   const Pose3 T_body_imu = read_euroc_pose(file);
-  if (T_body_imu.log().norm() > 1e-9) file.fail("T_BS", "must be the identity: body is the IMU");
+  if (T_body_imu.log().norm() > kIdentityTolerance) file.fail("T_BS", "must be the identity: body is the IMU");
   Rig rig;
   rig.imu.emplace();
   read_noise(file, rig.imu->noise);

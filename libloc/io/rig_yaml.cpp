@@ -58,7 +58,7 @@ Pose3 read_pose(YamlBlock block) {
   const std::vector<double> q = block.numbers("q_wxyz", 4);
   pose.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
   const double off = std::abs(pose.rotation.norm() - 1);
-  if (off > 1e-2) block.fail("q_wxyz", "must have norm 1, not " + std::to_string(pose.rotation.norm()));
+  if (off > 1e-2) block.fail("q_wxyz", "must have norm 1, not " + to_text(pose.rotation.norm()));
   // What a program wrote is kept to the last bit.
   if (off > kUnitTolerance) pose.rotation.normalize();
   block.finish();
@@ -144,8 +144,10 @@ void emit_camera(YAML::Emitter& out, const CameraCalibration& camera) {
   require(!camera.name.empty(), "a camera must have a name");
   out << YAML::BeginMap;
   out << YAML::Key << "name" << YAML::Value << YAML::DoubleQuoted << camera.name;
-  out << YAML::Key << "resolution" << YAML::Value << YAML::Flow << YAML::BeginSeq << camera.width_px << camera.height_px
-      << YAML::EndSeq;
+  out << YAML::Key << "resolution" << YAML::Value << YAML::Flow
+      << YAML::BeginSeq
+      // As text: the emitter writes numbers in the global locale, 1280 as 1.280.
+      << std::to_string(camera.width_px) << std::to_string(camera.height_px) << YAML::EndSeq;
   out << YAML::Key << "intrinsics" << YAML::Value;
   emit_list(out, camera.intrinsics_px);
   out << YAML::Key << "distortion_model" << YAML::Value << name_of(camera.distortion_model);

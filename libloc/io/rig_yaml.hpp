@@ -56,11 +56,12 @@ void write_rig(const std::filesystem::path& path, const Rig& rig);
 
 /// Kalibr's camchain (cam0, cam1, …: T_cam_imu, camera_model pinhole, intrinsics, distortion_model radtan, equidistant
 /// or none, distortion_coeffs, resolution, timeshift_cam_imu). A chain without IMU has T_cn_cnm1 only: cam0 is then
-/// taken as body. Other keys (cam_overlaps, rostopic) are passed over.
+/// taken as body. Cameras must be numbered without a gap. Other keys (cam_overlaps, rostopic) are passed over.
 std::vector<CameraCalibration> read_kalibr_camchain(const std::filesystem::path& path);
 
 /// Kalibr's imu.yaml: the four noise densities and update_rate, either at the top level or under imu0. Turn-on biases
-/// stay at their defaults, because the file does not have them.
+/// stay at their defaults, because the file does not have them. @throws DataError also for what cannot be taken over: a
+/// model other than calibrated (scale-misalignment: its matrices), a T_i_b that is not the identity, a time_offset.
 ImuCalibration read_kalibr_imu(const std::filesystem::path& path);
 
 /// For Kalibr's tools; cameras become cam0, cam1, …. @throws as write_rig; std::invalid_argument when the rig has no

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <charconv>
+#include <locale>
 #include <stdexcept>
 #include <system_error>
 
@@ -13,9 +14,24 @@ constexpr std::size_t kLongestLine = 65536;
 
 }  // namespace
 
-LineReader::LineReader(std::filesystem::path path) : path_(std::move(path)), buffer_(kLongestLine) {
+std::filesystem::file_status status_of(const std::filesystem::path& path) {
   std::error_code error;
-  const auto status = std::filesystem::status(path_, error);
+  const auto status = std::filesystem::status(path, error);
+  if (!std::filesystem::status_known(status)) {
+    throw DataError(path.string() + ": " + error.message());
+  }
+  return status;
+}
+
+std::uint64_t size_of(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) throw DataError(path.string() + ": cannot be read: " + error.message());
+  return size;
+}
+
+LineReader::LineReader(std::filesystem::path path) : path_(std::move(path)), buffer_(kLongestLine) {
+  const auto status = status_of(path_);
   if (!std::filesystem::exists(status)) throw DataError(path_.string() + ": no such file");
   if (std::filesystem::is_directory(status)) throw DataError(path_.string() + ": is a folder, not a file");
   file_.open(path_, std::ios::binary);
@@ -81,7 +97,7 @@ std::optional<TimeNs> parse_time(std::string_view text, int exponent) {
   std::int64_t own_exponent = 0;
   if (const auto e = text.find_first_of("eE"); e != std::string_view::npos) {
     std::string_view digits = text.substr(e + 1);
-    if (digits.starts_with('+')) digits.remove_prefix(1);
+    if (digits.starts_with('+') && !digits.starts_with("+-")) digits.remove_prefix(1);
     const auto value = parse_integer(digits);
     if (!value || *value < -30 || *value > 30) return std::nullopt;
     own_exponent = *value;
@@ -102,6 +118,7 @@ void append_number(std::string& text, double value) {
 
 AtomicFile::AtomicFile(std::filesystem::path path)
     : path_(std::move(path)), temporary_(path_.string() + "." + std::to_string(::getpid()) + ".tmp") {
+  file_.imbue(std::locale::classic());  // the global one may write 1280 as 1.280
   file_.open(temporary_, std::ios::binary | std::ios::trunc);
   if (!file_) throw DataError(path_.string() + ": cannot be written");
 }

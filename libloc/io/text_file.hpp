@@ -16,6 +16,13 @@
 
 namespace loc::io {
 
+/// What is at path; that there is nothing is no error.
+/// @throws DataError when it cannot be found out: a loop of symbolic links, a name too long, a folder that is closed.
+std::filesystem::file_status status_of(const std::filesystem::path& path);
+
+/// Bytes of a file. @throws DataError when there is no such file or it has no size.
+std::uint64_t size_of(const std::filesystem::path& path);
+
 /// Lines of any file of any size in constant memory. A byte order mark and carriage returns at line ends are taken off.
 class LineReader {
  public:

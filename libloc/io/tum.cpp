@@ -38,7 +38,7 @@ std::pair<TimeNs, Pose3> parse_pose(std::string_view line, const std::string& wh
   if (!io::trim(rest).empty()) throw DataError(where + ": more than 8 columns");
   const Eigen::Quaterniond q(values[6], values[3], values[4], values[5]);
   if (!(std::abs(q.norm() - 1) <= 1e-2)) {
-    throw DataError(where + ": quaternion with norm " + std::to_string(q.norm()) + ": must be 1");
+    throw DataError(where + ": quaternion with norm " + to_text(q.norm()) + ": must be 1");
   }
   return {*time_ns, Pose3(q.normalized(), {values[0], values[1], values[2]})};
 }

@@ -12,11 +12,10 @@ namespace {
 constexpr std::uintmax_t kLargestFile = 1 << 20;
 
 std::string read_text(const std::filesystem::path& path) {
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
+  const auto status = status_of(path);
   if (!std::filesystem::exists(status)) throw DataError(path.string() + ": no such file");
   if (!std::filesystem::is_regular_file(status)) throw DataError(path.string() + ": not a file");
-  if (std::filesystem::file_size(path, error) > kLargestFile) {
+  if (size_of(path) > kLargestFile) {
     throw DataError(path.string() + ": larger than 1 MB, which no such file is");
   }
   std::ifstream file(path, std::ios::binary);
@@ -66,6 +65,12 @@ std::string YamlBlock::where(const YAML::Node& node) const {
 void YamlBlock::fail(const char* key, const std::string& what) const {
   const YAML::Node node = node_[key];
   throw DataError(where(node.IsDefined() ? node : node_) + ": key '" + full(key) + "' " + what);
+}
+
+std::vector<std::string> YamlBlock::keys() const {
+  std::vector<std::string> keys;
+  for (const auto& entry : node_) keys.push_back(entry.first.Scalar());
+  return keys;
 }
 
 bool YamlBlock::has(const char* key) const {

@@ -33,6 +33,8 @@ class YamlBlock {
   static YamlBlock load(const std::filesystem::path& path, bool needs_end);
 
   bool has(const char* key) const;
+  /// In the order of the file.
+  std::vector<std::string> keys() const;
   double number(const char* key);
   std::string text(const char* key);
   /// size < 0: any

@@ -5,6 +5,7 @@
 
 #include "libloc/core/random.hpp"
 #include "libloc/io/rig_yaml.hpp"
+#include "tests/support/comma_locale.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/sources.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -147,6 +148,8 @@ TEST_F(RigYaml, errors_name_file_line_and_key) {
   expect_error("q_wxyz: [", "q_wxyz: [1, ", {"q_wxyz", "4 numbers"});
   expect_data_error([&] { read_rig(file("none.yaml")); }, {"none.yaml", "no such file"});
   expect_data_error([&] { read_rig(folder_.path()); }, {"not a file"});
+  std::filesystem::create_symlink("loop.yaml", file("loop.yaml"));
+  expect_data_error([&] { read_rig(file("loop.yaml")); }, {"loop.yaml", "symbolic links"});
   expect_data_error([&] { read_rig(folder_.write("e.yaml", "")); }, {"empty"});
   expect_data_error([&] { read_rig(folder_.write("e.yaml", "- 1\n...\n")); }, {"must hold keys"});
 }
@@ -268,6 +271,64 @@ TEST_F(RigYaml, errors_in_foreign_files_name_file_line_and_key) {
   for (std::size_t size = 0; size < kCamchain.size(); ++size) {
     EXPECT_THROW(read_kalibr_camchain(folder_.write("cut.yaml", kCamchain.substr(0, size))), DataError) << size;
   }
+}
+
+TEST_F(RigYaml, a_camchain_with_a_gap_is_refused) {
+  const auto numbered = [&](const std::string& second) {
+    std::string more = kCamchain;
+    return folder_.write("c.yaml", kCamchain + more.replace(0, 4, second));
+  };
+  EXPECT_NO_THROW(read_kalibr_camchain(numbered("cam1")));
+  for (const std::string second : {"cam2", "cam01", "cam10"}) {
+    expect_data_error([&] { read_kalibr_camchain(numbered(second)); }, {"c.yaml:16", "'" + second + "'", "cam1"});
+    expect_data_error([&] { read_any_rig(numbered(second)); }, {second});
+  }
+  EXPECT_EQ(read_kalibr_camchain(folder_.write("c.yaml", kCamchain + "camera_note: x\n")).size(), 1U);
+}
+
+TEST_F(RigYaml, a_kalibr_imu_that_needs_more_than_noise_is_refused) {
+  const std::string imu =
+      "imu0:\n"
+      "  T_i_b:\n"
+      "  - [1.0, 0.0, 0.0, 0.0]\n"
+      "  - [0.0, 1.0, 0.0, 0.0]\n"
+      "  - [0.0, 0.0, 1.0, 0.0]\n"
+      "  - [0.0, 0.0, 0.0, 1.0]\n"
+      "  accelerometer_noise_density: 0.002\n"
+      "  accelerometer_random_walk: 0.003\n"
+      "  gyroscope_noise_density: 0.0002\n"
+      "  gyroscope_random_walk: 0.00002\n"
+      "  model: calibrated\n"
+      "  rostopic: /imu0\n"
+      "  time_offset: 0.0\n"
+      "  update_rate: 200.0\n";
+  const auto changed = [&](const std::string& from, const std::string& to) {
+    std::string text = imu;
+    text.replace(text.find(from), from.size(), to);
+    return folder_.write("i.yaml", text);
+  };
+  EXPECT_EQ(read_kalibr_imu(folder_.write("i.yaml", imu)).noise.accelerometer_random_walk, 0.003);
+  expect_data_error([&] { read_kalibr_imu(changed("calibrated", "scale-misalignment")); },
+                    {"i.yaml:11", "imu0.model", "scale-misalignment"});
+  expect_data_error([&] { read_kalibr_imu(changed("0.0, 0.0]", "0.0, 0.1]")); }, {"i.yaml:3", "imu0.T_i_b"});
+  expect_data_error([&] { read_kalibr_imu(changed("[1.0, 0.0", "[0.5, 0.0")); }, {"imu0.T_i_b"});
+  expect_data_error([&] { read_kalibr_imu(changed("offset: 0.0", "offset: 0.1")); }, {"i.yaml:13", "imu0.time_offset"});
+  for (const std::string key : {"accelerometers", "gyroscopes"}) {
+    const std::string block = "  " + key + ":\n    M: [[1.1, 0, 0], [0, 1, 0], [0, 0, 1]]\n  model";
+    expect_data_error([&] { read_kalibr_imu(changed("  model", block)); }, {"imu0." + key});
+    expect_data_error([&] { read_any_rig(changed("  model", block)); }, {"imu0." + key});
+  }
+}
+
+TEST_F(RigYaml, the_locale_does_not_matter) {
+  const test::CommaLocale locale;
+  Rig rig = full_rig();
+  rig.cameras[0].width_px = 1280;
+  write_rig(file("rig.yaml"), rig);
+  EXPECT_EQ(read_rig(file("rig.yaml")).cameras[0].width_px, 1280);
+  EXPECT_EQ(read_rig(file("rig.yaml")).cameras[0].time_offset_s, -1.0 / 7);
+  write_kalibr_camchain(file("camchain.yaml"), rig);
+  EXPECT_EQ(read_kalibr_camchain(file("camchain.yaml"))[0].width_px, 1280);
 }
 
 TEST_F(RigYaml, reads_the_sensor_files_of_euroc) {
