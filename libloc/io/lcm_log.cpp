@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "libloc/core/check.hpp"
+#include "libloc/io/text_file.hpp"
 
 namespace loc {
 namespace {
@@ -18,6 +19,8 @@ constexpr std::size_t kHeaderBytes = 28;
 constexpr std::array<std::uint8_t, 4> kSync{0xED, 0xA1, 0xDA, 0x01};
 constexpr std::int64_t kLongestChannel = 999;  // what liblcm accepts
 constexpr std::size_t kChunkBytes = 1 << 20;
+constexpr std::size_t kFirstPieceBytes = 1 << 12;  // pieces grow: where much is damaged, the next header is near
+constexpr std::size_t kSearchBytes = 1 << 16;  // much less than a chunk: the buffer is moved up once in many searches
 
 std::uint64_t big_endian(std::span<const std::uint8_t> bytes) {
   std::uint64_t value = 0;
@@ -33,11 +36,10 @@ bool begins_with_sync(std::span<const std::uint8_t> bytes) {
 class Window {
  public:
   explicit Window(const std::filesystem::path& path) : path_(path.string()) {
-    std::error_code error;
-    if (!std::filesystem::exists(path, error)) throw DataError(path_ + ": no such file");
-    if (!std::filesystem::is_regular_file(path, error)) throw DataError(path_ + ": not a file");
-    size_ = std::filesystem::file_size(path, error);
-    if (error) throw DataError(path_ + ": " + error.message());
+    const auto status = io::status_of(path);
+    if (!std::filesystem::exists(status)) throw DataError(path_ + ": no such file");
+    if (!std::filesystem::is_regular_file(status)) throw DataError(path_ + ": not a file");
+    size_ = io::size_of(path);
     if (size_ == 0) throw DataError(path_ + ": the file is empty");
     file_.open(path, std::ios::binary);
     if (!file_) throw DataError(path_ + ": cannot be opened");
@@ -62,6 +64,21 @@ class Window {
     }
     return {buffer_.data() + begin_, bytes};
   }
+  /// Bytes farther on, for a look at them: what peek() holds does not grow. At most a chunk, fewer at the end of the
+  /// file. Earlier views become invalid.
+  std::span<const std::uint8_t> peek_at(std::uint64_t distance, std::size_t bytes) {
+    if (distance >= left()) return {};
+    bytes = static_cast<std::size_t>(std::min<std::uint64_t>({bytes, kChunkBytes, left() - distance}));
+    const std::uint64_t held = held_ - begin_;
+    if (distance + bytes <= held) return {buffer_.data() + begin_ + distance, bytes};
+    ahead_.resize(kChunkBytes);
+    file_.seekg(static_cast<std::streamoff>(offset_ + distance));
+    file_.read(reinterpret_cast<char*>(ahead_.data()), static_cast<std::streamsize>(bytes));
+    const bool complete = file_.gcount() == static_cast<std::streamsize>(bytes);
+    file_.seekg(static_cast<std::streamoff>(offset_ + held));
+    if (!complete || !file_) throw DataError(path_ + ": reading failed at byte " + std::to_string(offset_ + distance));
+    return {ahead_.data(), bytes};
+  }
   void skip(std::size_t bytes) {
     begin_ += bytes;
     offset_ += bytes;
@@ -76,6 +93,7 @@ class Window {
   std::vector<std::uint8_t> buffer_ = std::vector<std::uint8_t>(kChunkBytes);
   std::size_t begin_ = 0;
   std::size_t held_ = 0;
+  std::vector<std::uint8_t> ahead_;  // of peek_at()
 };
 
 struct Header {
@@ -117,14 +135,32 @@ struct LcmLogReader::State {
   std::optional<Header> event_here() {
     const auto header = parse_header(window.peek(kHeaderBytes), max_event_bytes);
     if (!header || static_cast<std::uint64_t>(header->event_bytes()) > window.left()) return std::nullopt;
-    const auto bytes = static_cast<std::size_t>(header->event_bytes());
-    const auto with_next = window.peek(bytes + kSync.size());
-    const auto next = with_next.subspan(bytes);
-    if (next.empty() || begins_with_sync(next)) return header;
-    for (std::size_t at = kHeaderBytes; at + kHeaderBytes <= bytes; ++at) {
-      if (parse_header(with_next.subspan(at, kHeaderBytes), max_event_bytes)) return std::nullopt;
+    const auto bytes = static_cast<std::uint64_t>(header->event_bytes());
+    // The bytes in between are fetched when the event is taken: a damaged header may state any length.
+    if (bytes + kSync.size() <= kChunkBytes) window.peek(static_cast<std::size_t>(bytes) + kSync.size());
+    const auto next = window.peek_at(bytes, kSync.size());
+    if (next.empty() || begins_with_sync(next) || !header_within(kHeaderBytes, bytes)) return header;
+    return std::nullopt;
+  }
+
+  // A header that can be believed lies between these distances. Stops at the first, so that the time for a damaged
+  // stretch does not grow with the lengths that are stated in it.
+  bool header_within(std::uint64_t from, std::uint64_t to) {
+    std::size_t most = kFirstPieceBytes;
+    while (from + kHeaderBytes <= to) {
+      const auto piece = window.peek_at(from, static_cast<std::size_t>(std::min<std::uint64_t>(to - from, most)));
+      if (piece.size() < kHeaderBytes) return false;
+      for (auto at = piece.begin();; ++at) {
+        at = std::search(at, piece.end(), kSync.begin(), kSync.end());
+        if (piece.end() - at < static_cast<std::ptrdiff_t>(kHeaderBytes)) break;
+        if (parse_header(piece.subspan(static_cast<std::size_t>(at - piece.begin()), kHeaderBytes), max_event_bytes)) {
+          return true;
+        }
+      }
+      from += piece.size() - (kHeaderBytes - 1);  // a header may begin in this piece and end in the next
+      most = std::min(4 * most, kChunkBytes);
     }
-    return header;
+    return false;
   }
 
   void count_skipped(std::uint64_t from, std::uint64_t bytes) {
@@ -135,7 +171,7 @@ struct LcmLogReader::State {
 
   // Bytes up to the next place where an event may begin; at least one.
   std::size_t distance_to_sync() {
-    const auto bytes = window.peek(kChunkBytes);
+    const auto bytes = window.peek(kSearchBytes);
     const auto found = std::search(bytes.begin() + 1, bytes.end(), kSync.begin(), kSync.end());
     if (found != bytes.end()) return static_cast<std::size_t>(found - bytes.begin());
     // The last three bytes may be the beginning of one, unless the file ends here.

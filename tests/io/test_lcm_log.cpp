@@ -99,6 +99,8 @@ TEST_F(LcmLog, offsets_and_numbers) {
 TEST_F(LcmLog, files_that_are_none_are_refused) {
   expect_data_error([&] { LcmLogReader(folder_.path() / "none.log"); }, {"none.log", "no such file"});
   expect_data_error([&] { LcmLogReader reader(folder_.path()); }, {"not a file"});
+  std::filesystem::create_symlink("loop.log", folder_.path() / "loop.log");
+  expect_data_error([&] { LcmLogReader reader(folder_.path() / "loop.log"); }, {"loop.log", "symbolic links"});
   expect_data_error([&] { read(""); }, {"empty"});
   expect_data_error([&] { read(std::string(5000, 'x')); }, {"not an LCM log", "5000"});
   expect_data_error([&] { LcmLogWriter writer(folder_.path() / "no" / "a.log"); }, {"cannot be written"});
@@ -186,6 +188,64 @@ TEST_F(LcmLog, absurd_lengths_allocate_nothing) {
   rusage after{};
   getrusage(RUSAGE_SELF, &after);
   EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 20'000) << "kB";
+}
+
+// Each of 100 000 headers states 50 MB that end inside the file, and none is an event.
+TEST_F(LcmLog, many_headers_that_state_long_events_take_no_memory) {
+  constexpr std::uint64_t kHeaders = 100'000;
+  constexpr std::uint64_t kSpacing = 32;
+  constexpr std::uint64_t kGoodAt = 40'000'000;
+  const std::string good = write(three_);
+  std::string header = good.substr(0, 28);
+  header.replace(24, 4, std::string("\x03\x20\x00\x00", 4));  // 50 MB
+  header.resize(kSpacing, '.');
+  const auto path = folder_.path() / "long.log";
+  {
+    std::ofstream out(path, std::ios::binary);
+    for (std::uint64_t i = 0; i < kHeaders; ++i) out << header;
+    out.seekp(kGoodAt);
+    out << good;
+  }
+  std::filesystem::resize_file(path, 60'000'000);  // zeros to the end, which take no room on the disk
+  rusage before{};
+  getrusage(RUSAGE_SELF, &before);
+  LcmLogReader reader(path);
+  EXPECT_EQ(read_all(reader), three_);
+  rusage after{};
+  getrusage(RUSAGE_SELF, &after);
+  EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 10'000) << "kB";
+  EXPECT_EQ(reader.damage().gaps, 2);
+  EXPECT_EQ(*reader.damage().first_gap_offset, 0U);
+  EXPECT_EQ(reader.damage().skipped_bytes, static_cast<std::int64_t>(60'000'000 - good.size()));
+}
+
+TEST_F(LcmLog, an_event_inside_a_long_damaged_one_is_found_wherever_it_lies) {
+  const std::string good = write(three_);
+  constexpr std::size_t kChunk = 1 << 20;
+  for (const std::size_t before :
+       {std::size_t{0}, kChunk - 29, kChunk - 28, kChunk - 27, kChunk - 2, kChunk, 2 * kChunk}) {
+    SCOPED_TRACE(before);
+    std::string text = good.substr(0, 28);
+    text.replace(24, 4, std::string("\x00\x40\x00\x00", 4));  // 4 MB
+    text += std::string(before, 'x') + good + std::string(5 * kChunk, 'y');
+    LcmLogDamage damage;
+    EXPECT_EQ(read(text, &damage), three_);
+    EXPECT_EQ(damage.gaps, 2);
+    EXPECT_EQ(damage.skipped_bytes, static_cast<std::int64_t>(text.size() - good.size()));
+  }
+}
+
+TEST_F(LcmLog, long_events_are_read) {
+  std::vector<Event> events;
+  for (const std::size_t size : {(1 << 20) - 40, (1 << 20) - 29, 1 << 20, 5 << 20, 3, 2 << 20}) {
+    events.push_back({1, "A", std::string(size, static_cast<char>('a' + events.size()))});
+  }
+  const std::string text = write(events);
+  LcmLogDamage damage;
+  EXPECT_EQ(read(text, &damage), events);
+  EXPECT_EQ(damage.gaps, 0);
+  EXPECT_EQ(read(text + "end", &damage), events) << "what follows is no event, and none lies inside the last one";
+  EXPECT_EQ(damage.skipped_bytes, 3);
 }
 
 TEST_F(LcmLog, a_limit_on_the_size_of_an_event_holds) {
