@@ -38,8 +38,12 @@ struct CsvOptions {
   double tesla_per_unit = 0;  ///< [T], for the unit arb; 0: arb is an error.
 };
 
-/// A recording in one file. Skipped and counted, as told in euroc.hpp: rows whose time is not after the one before, a
-/// last line without its line end; counted: values that are not finite.
+/// A recording in one file; measurements of one time come row by row, within a row magnetometer, reference, IMU.
+/// Rows may share a time (one sensor per row). Skipped and counted: rows that go back in time
+/// ("rows.skipped.time_not_increasing"), in a row of the same time as the one before a sensor that was there already
+/// ("imu.skipped.time_not_increasing"), rows that hold no measurement ("rows.skipped.empty") or nothing at all
+/// ("rows.skipped.blank"), a last line without its line end ("rows.skipped.no_line_end"). Values that are not finite
+/// pass and are counted ("imu.not_finite").
 /// @throws DataError naming file, line, column and value: here for the heading, from next() for a row.
 std::unique_ptr<MeasurementSource> open_csv(const std::filesystem::path& path, const CsvOptions& options = {});
 

@@ -45,7 +45,7 @@ class Stream {
       } else if (kind_ == StreamKind::kReference && row->reference) {
         head_ = *row->reference;
       } else {
-        throw DataError(table_.where() + ": empty cells");
+        throw DataError(table_.where() + ": no cells of " + stream_name(kind_));
       }
       stamp_of(*head_).sequence = sequence_++;
     }
@@ -62,18 +62,23 @@ class EurocSource final : public MeasurementSource {
  public:
   EurocSource(const fs::path& folder, const EurocOptions& options) {
     fs::path mav = folder;
-    if (fs::is_directory(folder / "mav0")) mav = folder / "mav0";
-    if (!fs::is_directory(mav)) throw DataError(folder.string() + ": no such folder");
+    if (fs::is_directory(io::status_of(folder / "mav0"))) mav = folder / "mav0";
+    if (!fs::is_directory(io::status_of(mav))) throw DataError(folder.string() + ": no such folder");
     const fs::path imu = mav / "imu0" / "data.csv";
-    if (!fs::exists(imu)) throw DataError(imu.string() + ": no such file; an EuRoC recording has it in mav0/imu0");
+    if (!fs::exists(io::status_of(imu)))
+      throw DataError(imu.string() + ": no such file; an EuRoC recording has it in mav0/imu0");
 
     // In the order of equal times. EuRoC counts nanoseconds throughout, though not every heading says so.
     CsvOptions csv;
     csv.time_unit = "ns";
     const fs::path field = mav / "mag0" / "data.csv";
-    if (options.read_magnetometer && fs::exists(field)) streams_[0].emplace(field, StreamKind::kMagnetometer, csv);
+    if (options.read_magnetometer && fs::exists(io::status_of(field))) {
+      streams_[0].emplace(field, StreamKind::kMagnetometer, csv);
+    }
     const fs::path reference = mav / "state_groundtruth_estimate0" / "data.csv";
-    if (options.read_reference && fs::exists(reference)) streams_[1].emplace(reference, StreamKind::kReference, csv);
+    if (options.read_reference && fs::exists(io::status_of(reference))) {
+      streams_[1].emplace(reference, StreamKind::kReference, csv);
+    }
     streams_[2].emplace(imu, StreamKind::kImu, csv);
   }
 

@@ -18,9 +18,10 @@ struct EurocOptions {
 };
 
 /// A recording: IMU, magnetometer and reference merged in time order; at equal times magnetometer, reference, IMU.
-/// Rows whose time is not after the row's before are skipped and counted ("imu.skipped.time_not_increasing"), and so is
-/// a last line without its line end, which may have been cut ("imu.skipped.no_line_end"). NaN and infinity in a
-/// measurement pass and are counted ("imu.not_finite"). A reference quaternion is normalised.
+/// Rows whose time is not after the row's before are skipped and counted ("imu.skipped.time_not_increasing"), and so
+/// are rows whose cells are all empty ("imu.skipped.empty") and a last line without its line end, which may have been
+/// cut ("imu.skipped.no_line_end"). NaN and infinity in a measurement pass and are counted ("imu.not_finite"). A
+/// reference quaternion is normalised.
 /// @param folder the one that holds mav0, or mav0 itself
 /// @throws DataError naming file, line and column, here for a missing or empty imu0 and wrong headings, and from next()
 /// for a row that cannot be read.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "libloc/core/check.hpp"
 
@@ -71,14 +72,36 @@ std::optional<Row> Table::read_row() {
     }
     // All of the row is read even when it is skipped then: damage must show.
     Row row = convert(*time_ns);
-    if (last_time_ns_ != kNoTime && *time_ns <= last_time_ns_) {
-      ++not_increasing_;
+    if (row.empty()) {
+      ++empty_;
       continue;
     }
+    if (*time_ns < last_time_ns_) {
+      ++rows_back_;
+      continue;
+    }
+    drop_repeated(row);
+    if (row.empty()) continue;
     last_time_ns_ = *time_ns;
     return row;
   }
   return std::nullopt;
+}
+
+// Rows may share a time, one for each sensor. Times are compared sensor by sensor, so that none is lost for another.
+void Table::drop_repeated(Row& row) {
+  const auto check = [&](auto& measurement, std::size_t i) {
+    if (!measurement) return;
+    if (measurement->time_ns <= last_[i]) {  // false for the first: kNoTime is before every time
+      ++repeated_[i];
+      measurement.reset();
+    } else {
+      last_[i] = measurement->time_ns;
+    }
+  };
+  check(row.magnetometer, kMagnetometerRow);
+  check(row.reference, kReferenceRow);
+  check(row.imu, kImuRow);
 }
 
 // True when the cells hold the quantity, false when all are empty (or there is no such column).
@@ -139,7 +162,7 @@ Row Table::convert(TimeNs time_ns) {
     any = true;
     const Eigen::Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
     if (std::abs(q.norm() - 1) > 1e-2) {  // false for NaN, which passes
-      throw DataError(lines_.where() + ": reference quaternion with norm " + std::to_string(q.norm()) + ": must be 1");
+      throw DataError(lines_.where() + ": reference quaternion with norm " + to_text(q.norm()) + ": must be 1");
     }
     if (std::isfinite(q.norm())) reference.q_world_body = q.normalized();
   }
@@ -147,7 +170,7 @@ Row Table::convert(TimeNs time_ns) {
   any = take(Quantity::kVelocity, reference.velocity.data()) || any;
   if (take(Quantity::kScore, &score)) {
     if (score != 0 && score != 1) {
-      throw DataError(lines_.where() + ": score = " + std::to_string(score) + ": must be 0 or 1");
+      throw DataError(lines_.where() + ": score = " + to_text(score) + ": must be 0 or 1");
     }
     reference.score = score == 1;
   }
@@ -160,7 +183,15 @@ void Table::add_counts(NamedCounts& counts) const {
     if (read_[i] > 0) counts.push_back({std::string(kRowNames[i]) + ".read", read_[i]});
     if (not_finite_[i] > 0) counts.push_back({std::string(kRowNames[i]) + ".not_finite", not_finite_[i]});
   }
-  if (not_increasing_ > 0) counts.push_back({label_ + ".skipped.time_not_increasing", not_increasing_});
+  // A file of one sensor is labelled with the sensor's name: then both are one count.
+  std::int64_t rows_back = rows_back_;
+  for (std::size_t i = 0; i < repeated_.size(); ++i) {
+    std::int64_t skipped = repeated_[i];
+    if (label_ == kRowNames[i]) skipped += std::exchange(rows_back, 0);
+    if (skipped > 0) counts.push_back({std::string(kRowNames[i]) + ".skipped.time_not_increasing", skipped});
+  }
+  if (rows_back > 0) counts.push_back({label_ + ".skipped.time_not_increasing", rows_back});
+  if (empty_ > 0) counts.push_back({label_ + ".skipped.empty", empty_});
   if (blank_ > 0) counts.push_back({label_ + ".skipped.blank", blank_});
   if (lines_.cut_tail()) counts.push_back({label_ + ".skipped.no_line_end", 1});
 }

@@ -16,8 +16,10 @@
 
 namespace loc::io {
 
-/// What one row held, at its time.
+/// What one row held, at its time: something.
 struct Row {
+  bool empty() const { return !magnetometer && !reference && !imu; }
+
   std::optional<MagnetometerMeasurement> magnetometer;
   std::optional<ReferenceMeasurement> reference;
   std::optional<ImuMeasurement> imu;
@@ -39,6 +41,7 @@ class Table {
  private:
   std::optional<Row> read_row();
   Row convert(TimeNs time_ns);
+  void drop_repeated(Row& row);
   bool take(Quantity quantity, double* values) const;
 
   LineReader lines_;
@@ -47,10 +50,14 @@ class Table {
   std::vector<std::string_view> cells_;
   std::array<std::array<std::optional<std::size_t>, 4>, kQuantities> at_{};  // cell of each quantity and axis
   std::optional<Row> ahead_;
-  TimeNs last_time_ns_ = kNoTime;
-  std::int64_t not_increasing_ = 0;
+  TimeNs last_time_ns_ = kNoTime;  // of the last row that was given
+  std::int64_t rows_back_ = 0;
   std::int64_t blank_ = 0;
-  std::array<std::int64_t, 3> read_{};  // magnetometer, reference, imu
+  std::int64_t empty_ = 0;
+  // magnetometer, reference, imu
+  std::array<TimeNs, 3> last_{kNoTime, kNoTime, kNoTime};
+  std::array<std::int64_t, 3> repeated_{};
+  std::array<std::int64_t, 3> read_{};
   std::array<std::int64_t, 3> not_finite_{};
 };
 

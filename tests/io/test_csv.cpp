@@ -1,10 +1,11 @@
 // Recordings as comma-separated text: headings, units, damage.
 #include <gtest/gtest.h>
 
-#include <clocale>
 #include <numbers>
+#include <sstream>
 
 #include "libloc/io/csv.hpp"
+#include "tests/support/comma_locale.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/sources.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -153,6 +154,7 @@ TEST_F(Csv, bad_cells_are_told_with_line_and_column) {
   expect_error(good + ",1,2,3,4,5,6\n", {"time_ns", "''"});
   expect_error(good + "9223372036854775808,1,2,3,4,5,6\n", {"9223372036854775808"});
   expect_error(good + "-9223372036854775808,1,2,3,4,5,6\n", {"is not a time"});
+  expect_error("time_s,px,py,pz\n1e+-5,1,2,3\n", {"a.csv:2", "'1e+-5'"});
   expect_error(good + "2,,,,4,5,6\n", {"a.csv:3", "empty"});
   expect_error(good + std::string("2,1,2\0,3,4,5,6\n", 15), {"a.csv:3"});
 }
@@ -176,9 +178,53 @@ TEST_F(Csv, repeated_shuffled_and_backward_rows_are_skipped_and_counted) {
   const auto all = read_all(*source);
   ASSERT_EQ(all.size(), 3U);
   EXPECT_EQ(stamp_of(all[2]).time_ns, 6);
-  EXPECT_EQ(count(source->counts(), "rows.skipped.time_not_increasing"), 2);
+  EXPECT_EQ(count(source->counts(), "imu.skipped.time_not_increasing"), 1) << "the repeated one";
+  EXPECT_EQ(count(source->counts(), "rows.skipped.time_not_increasing"), 1) << "the one that goes back";
+  EXPECT_EQ(count(source->counts(), "imu.read"), 3);
   // Damage in a row that would be skipped shows all the same.
   expect_error(kHeading + "2,1,2,3,4,5,6\n1,1,2,3,4,5,oops\n", {"a.csv:3", "oops"});
+}
+
+const std::string kImuAndField = "time_s,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2,mx_ut,my_ut,mz_ut\n";
+
+TEST_F(Csv, one_sensor_per_row_loses_none) {
+  const auto source = open(kImuAndField +
+                           "1,1,2,3,4,5,6,,,\n1,,,,,,,10,20,30\n"
+                           "2,,,,,,,11,20,30\n2,1,2,3,4,5,7,,,\n");
+  const auto all = read_all(*source);
+  ASSERT_EQ(only<ImuMeasurement>(all).size(), 2U);
+  const auto field = only<MagnetometerMeasurement>(all);
+  ASSERT_EQ(field.size(), 2U);
+  EXPECT_EQ(field[0].time_ns, 1'000'000'000);
+  EXPECT_DOUBLE_EQ(field[1].magnetic_field.x(), 1.1e-5);
+  EXPECT_EQ(field[1].sequence, 1);
+  EXPECT_TRUE(std::holds_alternative<ImuMeasurement>(all[0])) << "at one time as in the file";
+  EXPECT_EQ(source->counts().size(), 2U) << "nothing skipped";
+}
+
+TEST_F(Csv, of_a_row_at_the_same_time_only_what_is_repeated_is_skipped) {
+  const auto source = open(kImuAndField +
+                           "1,1,2,3,4,5,6,,,\n1,9,9,9,9,9,9,10,20,30\n1,,,,,,,9,9,9\n"
+                           "2,1,2,3,4,5,6,,,\n1.5,,,,,,,10,20,30\n3,,,,,,,10,20,30\n");
+  const auto all = read_all(*source);
+  ASSERT_EQ(only<ImuMeasurement>(all).size(), 2U);
+  EXPECT_EQ(only<ImuMeasurement>(all)[0].angular_velocity, Eigen::Vector3d(1, 2, 3)) << "the first one counts";
+  const auto field = only<MagnetometerMeasurement>(all);
+  ASSERT_EQ(field.size(), 2U);
+  EXPECT_EQ(field[1].time_ns, 3'000'000'000) << "the row that goes back would break the order in time";
+  EXPECT_EQ(count(source->counts(), "imu.read"), 2);
+  EXPECT_EQ(count(source->counts(), "magnetometer.read"), 2);
+  EXPECT_EQ(count(source->counts(), "imu.skipped.time_not_increasing"), 1);
+  EXPECT_EQ(count(source->counts(), "magnetometer.skipped.time_not_increasing"), 1);
+  EXPECT_EQ(count(source->counts(), "rows.skipped.time_not_increasing"), 1);
+}
+
+TEST_F(Csv, rows_without_any_value_are_counted) {
+  const auto source = open(kImuAndField + "1,1,2,3,4,5,6,,,\n7, ,,,,,,,,\n2,1,2,3,4,5,6,,,\n");
+  EXPECT_EQ(read_all(*source).size(), 2U);
+  EXPECT_EQ(count(source->counts(), "rows.skipped.empty"), 1);
+  EXPECT_EQ(count(source->counts(), "rows.skipped.time_not_increasing"), 0) << "its time says nothing";
+  expect_error(kImuAndField + "1,,,,,,,,,\n", {"a.csv", "no complete row"});
 }
 
 TEST_F(Csv, byte_order_mark_carriage_returns_and_blank_lines) {
@@ -211,11 +257,29 @@ TEST_F(Csv, cut_at_any_byte_gives_an_error_or_a_part_of_the_rows) {
 }
 
 TEST_F(Csv, the_locale_does_not_matter) {
-  const char* comma = std::setlocale(LC_ALL, "de_DE.UTF-8");
-  const auto imu = only<ImuMeasurement>(read(kHeading + "1,1.5,2,3,4,5,6\n"));
-  std::setlocale(LC_ALL, "C");
-  EXPECT_EQ(imu.at(0).angular_velocity.x(), 1.5);
-  if (comma == nullptr) GTEST_SKIP() << "no locale with a decimal comma on this machine";
+  const test::CommaLocale locale;
+  std::ostringstream out;
+  out << 1234.5;
+  ASSERT_EQ(out.str(), "1.234,5") << "the locale is in force";
+  const auto source = open("time_ms,wx_rad_s,wy_rad_s,wz_rad_s,ax_g,ay_g,az_g\n1234.5,1.5,2000,3e-3,4,5,1\n");
+  const auto imu = only<ImuMeasurement>(read_all(*source));
+  ASSERT_EQ(imu.size(), 1U);
+  EXPECT_EQ(imu[0].time_ns, 1'234'500'000);
+  EXPECT_EQ(imu[0].angular_velocity, Eigen::Vector3d(1.5, 2000, 3e-3));
+  EXPECT_EQ(imu[0].specific_force.z(), 9.80665);
+  expect_error("time_s,px,py,pz\n\"1,5\",1,2,3\n", {"a.csv:2"});
+
+  Estimate e;
+  e.time_ns = 1'234'567;
+  e.sequence = 5678;
+  e.valid = kValidPosition;
+  e.position = {1234.5, 0.25, -1e6};
+  CsvWriter writer(folder_.path() / "e.csv");
+  writer.write(e);
+  writer.flush();
+  const std::string text = test::read_file(folder_.path() / "e.csv");
+  EXPECT_NE(text.find("\n1234567,,,,,1234.5,0.25,-1e+06,"), std::string::npos) << text;
+  EXPECT_TRUE(text.ends_with(",5678\n")) << text;
 }
 
 TEST_F(Csv, reads_a_real_calibration_recording) {

@@ -83,6 +83,25 @@ TEST_F(Euroc, what_is_missing_or_wrong_is_told) {
   expect_data_error([&] { open_euroc(recording()); }, {"no columns of imu"});
 }
 
+TEST_F(Euroc, paths_that_cannot_be_followed_are_told) {
+  const auto field = recording() / "mav0/mag0";
+  std::filesystem::create_symlink("mag0", field);
+  expect_data_error([&] { open_euroc(recording()); }, {"mag0/data.csv", "symbolic links"});
+  EXPECT_NO_THROW(open_euroc(recording(), {.read_magnetometer = false}));
+  const auto loop = folder_.path() / "loop";
+  std::filesystem::create_symlink("loop", loop);
+  expect_data_error([&] { open_euroc(loop); }, {"loop", "symbolic links"});
+  expect_data_error([&] { open_euroc(folder_.path() / std::string(300, 'n')); }, {"nnn", "name too long"});
+  expect_data_error([&] { open_euroc(recording() / "mav0/imu0/data.csv"); }, {"data.csv", "no such folder"});
+}
+
+TEST_F(Euroc, rows_without_any_value_are_counted) {
+  folder_.write("r/mav0/imu0/data.csv", kImu + "1403715273277142848,,,,,,\n");
+  const auto source = open_euroc(recording());
+  EXPECT_EQ(only<ImuMeasurement>(read_all(*source)).size(), 3U);
+  EXPECT_EQ(count(source->counts(), "imu.skipped.empty"), 1);
+}
+
 TEST_F(Euroc, a_bad_row_is_told_after_the_rows_before_it) {
   folder_.write("r/mav0/imu0/data.csv", kImu + "1403715273277142848,-0.004,0.02,zero,8.3,-0.3,-2.7\n");
   const auto source = open_euroc(recording());
@@ -95,6 +114,7 @@ TEST_F(Euroc, repeated_and_shuffled_rows_are_counted) {
   const auto source = open_euroc(recording());
   EXPECT_EQ(only<ImuMeasurement>(read_all(*source)).size(), 3U);
   EXPECT_EQ(count(source->counts(), "imu.skipped.time_not_increasing"), 3);
+  EXPECT_EQ(std::ranges::count(source->counts(), "imu.skipped.time_not_increasing", &NamedCount::name), 1);
 }
 
 TEST_F(Euroc, cut_at_any_byte_gives_an_error_or_a_part_of_the_rows) {
