@@ -14,8 +14,8 @@ bool is_unit_or_unknown(const Eigen::Quaterniond& q, const char* name, std::size
   if (!q.coeffs().allFinite()) return false;
   const double norm = q.norm();
   if (std::abs(norm - 1) > 1e-3) {
-    throw DataError(std::string(name) + " " + std::to_string(index) + ": its quaternion has norm " +
-                    std::to_string(norm) + ": must be 1");
+    throw DataError(std::string(name) + " " + std::to_string(index) + ": its quaternion has norm " + to_text(norm) +
+                    ": must be 1");
   }
   return true;
 }

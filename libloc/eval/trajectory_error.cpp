@@ -248,7 +248,7 @@ RelativeError relative_error(const Trajectory& estimate, const Trajectory& refer
                               : consecutive_pairs(steps, delta);
   }
   if (pairs.empty()) {
-    throw DataError("no piece of " + std::to_string(options.delta) + " " + unit_name(options.unit) + " in " +
+    throw DataError("no piece of " + to_text(options.delta) + " " + unit_name(options.unit) + " in " +
                     std::to_string(estimate.size()) + " poses");
   }
   RelativeError result;

@@ -39,7 +39,7 @@ void Trajectory::check(std::string_view name) const {
     const double norm = poses[i].rotation.norm();
     // The comparison is false for NaN.
     if (!(std::abs(norm - 1) < 1e-6)) {
-      throw DataError(where + "its quaternion has norm " + std::to_string(norm) + ": must be 1");
+      throw DataError(where + "its quaternion has norm " + to_text(norm) + ": must be 1");
     }
   }
 }
