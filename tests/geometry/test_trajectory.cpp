@@ -77,7 +77,7 @@ TEST(Trajectory, CheckNamesWhatIsWrong) {
   EXPECT_EQ(message(t), "estimate: pose 1: its translation is not finite");
   t = good;
   t.poses[1].rotation.w() = 2;
-  EXPECT_EQ(message(t), "estimate: pose 1: its quaternion has norm 2.000000: must be 1");
+  EXPECT_EQ(message(t), "estimate: pose 1: its quaternion has norm 2: must be 1");
   t.poses[1].rotation.w() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_NE(message(t), "");
 }
