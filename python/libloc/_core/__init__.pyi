@@ -778,6 +778,14 @@ class MadgwickOptions:
     def magnetometer_weight(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def max_angular_velocity(self) -> float:
+        """
+        A sample with more is skipped. [rad/s]
+        """
+    @max_angular_velocity.setter
+    def max_angular_velocity(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def max_gap_s(self) -> float:
         """
         A longer time between IMU samples starts the filter anew. [s]
@@ -794,12 +802,28 @@ class MadgwickOptions:
     def max_gyroscope_bias(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def max_heading_age_s(self) -> float:
+        """
+        So long after the last use of the field the heading still counts as valid. [s]
+        """
+    @max_heading_age_s.setter
+    def max_heading_age_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def max_magnetometer_age_s(self) -> float:
         """
         Until then a magnetometer sample is used on. [s]
         """
     @max_magnetometer_age_s.setter
     def max_magnetometer_age_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_specific_force(self) -> float:
+        """
+        With more the step goes without the accelerometer. [m/s^2]
+        """
+    @max_specific_force.setter
+    def max_specific_force(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def motion_bias(self) -> bool:
@@ -945,7 +969,7 @@ class EstimateValid(enum.IntFlag):
         ...
 class EstimateStatus(enum.IntFlag):
     """
-    What an estimator did with its last input, and why. 0 is the normal case.
+    What an estimator did with the input since its last estimate, and why; 0 is normal.
     """
     ACCELEROMETER_IGNORED: typing.ClassVar[EstimateStatus]
     AT_REST: typing.ClassVar[EstimateStatus]
@@ -955,6 +979,7 @@ class EstimateStatus(enum.IntFlag):
     MAGNETOMETER_IGNORED: typing.ClassVar[EstimateStatus]
     MAGNETOMETER_MISSING: typing.ClassVar[EstimateStatus]
     NOT_FINITE: typing.ClassVar[EstimateStatus]
+    OUT_OF_RANGE: typing.ClassVar[EstimateStatus]
     REINITIALISED: typing.ClassVar[EstimateStatus]
     TIME_NOT_INCREASING: typing.ClassVar[EstimateStatus]
     @classmethod
