@@ -40,18 +40,33 @@ int run_offline(const Arguments& arguments, loc::AnyEstimator estimator) {
   loc::SourceSpec input = arguments.input;
   if (input.kind.empty()) input.kind = loc::guess_source_kind(input.path);
   input.decode.channels = arguments.live.channels;
+  loc::refuse_to_overwrite(input.path, arguments.output);
   const auto source = loc::open_source(input);
   const auto output = loc::open_estimate_output(arguments.output, estimator.method(), estimator.world());
+  std::int64_t estimates = 0;
   loc::EstimatorPipeline pipeline(std::move(estimator), loc::load_rig(arguments.config), arguments.live.merger,
-                                  [&](const loc::Estimate& estimate) { output->write(estimate); });
+                                  [&](const loc::Estimate& estimate) {
+                                    ++estimates;
+                                    output->write(estimate);
+                                  });
   while (auto measurement = source->next()) {
     if (loc::stop_requested()) break;
     pipeline.push(std::move(*measurement));
   }
   pipeline.end();
   output->finish();
-  spdlog::info("event=ended interrupted={} source=\"{}\" {} {}", loc::stop_requested(), input.path,
-               loc::format_counts(source->counts()), loc::format_counts(pipeline.counts()));
+  spdlog::info("event=ended interrupted={} estimates={} output=\"{}\" source=\"{}\" {} {}", loc::stop_requested(),
+               estimates, arguments.output, input.path, loc::format_counts(source->counts()),
+               loc::format_counts(pipeline.counts()));
+  for (const loc::NamedCount& count : source->counts()) {
+    if (count.value > 0 && count.name.find("skipped") != std::string::npos) {
+      spdlog::warn("event=skipped source=\"{}\" {}={}", input.path, count.name, count.value);
+    }
+  }
+  if (estimates == 0) {
+    spdlog::error("event=no_estimate source=\"{}\" reason=\"no IMU sample could be used\"", input.path);
+    return loc::kExitFailed;
+  }
   return loc::stop_requested() ? loc::kExitFailed : loc::kExitOk;
 }
 
@@ -101,7 +116,7 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"euroc", "lcm-log", "csv", "broad"}))
       ->needs(input);
   CLI::Option* output =
-      app.add_option("--output", arguments.output, "Off line: *.csv, *.tum, or an LCM log")->needs(input);
+      app.add_option("--output", arguments.output, "Off line: *.csv, *.tum, or *.lcm (an LCM log)")->needs(input);
   input->needs(output);
 
   return program.run(argc, argv, [&] {

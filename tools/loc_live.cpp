@@ -2,6 +2,7 @@
 #include <spdlog/spdlog.h>
 
 #include "tools/support/live_session.hpp"
+#include "tools/support/open_source.hpp"
 #include "tools/support/program.hpp"
 
 int main(int argc, char** argv) {
@@ -43,6 +44,7 @@ int main(int argc, char** argv) {
                         : transport == "udpm" ? loc::Transport::kUdpm
                                               : loc::Transport::kHub;
     options.as_fast_as_taken = speed == "max";
+    if (!options.log_path.empty()) loc::refuse_to_overwrite(path, options.log_path);
     options.driver = {kind, path, "--speed", speed};
     for (std::string& argument : CLI::detail::split_up(driver_arguments)) options.driver.push_back(std::move(argument));
     options.estimator = CLI::detail::split_up(estimator_arguments);

@@ -16,6 +16,8 @@ namespace {
 constexpr double kMaxField = 1e6;
 // Samples in a row on another time line that mean: the clock was set back.
 constexpr int kSetBackAfter = 20;
+// Part of the force's time constant over which the field is averaged at the start.
+constexpr double kStartFieldMean = 0.2;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A direction needs a vector; in the unit of the sensor (m/s^2, T or any other that the user's magnetometer has).
 constexpr double kMinForce = 1e-3;
@@ -470,11 +472,14 @@ std::uint32_t MadgwickFilter::update(const ImuMeasurement& imu) {
   if (size > 0) {
     Eigen::Vector3d v = weight / size * gradient;
     if (starting && dt > 0) {
-      // While the force has not been averaged yet, attitude and heading follow what it and the field say now; then the
-      // mean over all that comes goes on from there.
-      const double gain = 0.5 * dt / (std::max(0.0, elapsed_s_ - options_.accelerometer_time_constant_s) + dt);
-      const double tilt_gain = std::max(weight / size, gain);
-      const double heading_gain = std::max(weight / size, gain / std::max(options_.magnetometer_weight, 0.1));
+      // At first the tilt follows the averaged force and the heading a short mean of the field, so that a heading read
+      // with a wrong tilt is soon forgotten; then the mean over all that comes goes on from there.
+      const double force_time = options_.accelerometer_time_constant_s;
+      const double averaged = std::max(0.0, elapsed_s_ - force_time);
+      const double field_averaged = averaged + std::min(elapsed_s_, kStartFieldMean * force_time);
+      const double tilt_gain = std::max(weight / size, 0.5 * dt / (averaged + dt));
+      const double heading_gain =
+          std::max(weight / size, 0.5 * dt / (field_averaged + dt) / std::max(options_.magnetometer_weight, 0.1));
       v = {tilt_gain * gradient.x(), tilt_gain * gradient.y(), heading_gain * gradient.z()};
     }
     if (options_.motion_bias && dt > 0) update_motion_bias(2 / dt * v, R, dt);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <thread>
 
@@ -368,6 +369,7 @@ TEST_F(Programs, UsageErrorsGiveExitCodeTwo) {
   std::fputs("format: libloc-rig-1\nimu:\n  rate: 3\n...\n", file);
   std::fclose(file);
   const std::string csv = path("r.csv");
+  const auto size = std::filesystem::file_size(csv);
   const std::vector<std::pair<std::string, Arguments>> wrong = {
       {"loc-hub", {"--port", "70000"}},
       {"loc-hub", {"--bind", "somewhere"}},
@@ -390,6 +392,9 @@ TEST_F(Programs, UsageErrorsGiveExitCodeTwo) {
       {"loc-estimator", {"--input", csv}},
       {"loc-estimator", {"--config", path("broken.yaml"), "--input", csv, "--output", path("x.csv")}},
       {"loc-estimator", {"--log-level", "loud"}},
+      {"loc-estimator", {"--input", csv, "--output", path("x.json")}},
+      {"loc-estimator", {"--input", csv, "--output", csv}},
+      {"loc-live", {"csv", csv, "--log", csv}},
       {"loc-live", {}},
       {"loc-live", {"csv", path("missing.csv")}},
       {"loc-live", {"csv", csv, "--transport", "pigeon"}},
@@ -399,6 +404,7 @@ TEST_F(Programs, UsageErrorsGiveExitCodeTwo) {
     for (const std::string& argument : arguments) line += " " + argument;
     EXPECT_EQ(run_program(program, arguments), 2) << line << "\n" << errors(program);
   }
+  EXPECT_EQ(std::filesystem::file_size(csv), size) << "a recording is never written over";
   for (const char* program : {"loc-hub", "loc-driver", "loc-estimator", "loc-live"}) {
     EXPECT_EQ(run_program(program, {"--help"}), 0);
     EXPECT_EQ(run_program(program, {"--version"}), 0);
@@ -411,6 +417,9 @@ TEST_F(Programs, RunTimeFailuresGiveExitCodeOne) {
   EXPECT_NE(errors("loc-estimator").find("start loc-hub"), std::string::npos) << errors("loc-estimator");
   EXPECT_EQ(run_program("loc-driver", {"csv", path("r.csv"), "--lcm-url", "tcpq://127.0.0.1:1"}), 1);
   EXPECT_EQ(run_program("loc-estimator", {"--input", path("r.csv"), "--output", path("no/such/folder/x.csv")}), 1);
+  std::ofstream(path("field.csv")) << "time [s],mx [uT],my [uT],mz [uT]\n0,1,2,3\n1,1,2,3\n";
+  EXPECT_EQ(run_program("loc-estimator", {"--input", path("field.csv"), "--output", path("x.csv")}), 1);
+  EXPECT_NE(errors("loc-estimator").find("event=no_estimate"), std::string::npos) << errors("loc-estimator");
   const RunningHub hub(folder_);
   EXPECT_EQ(run_program("loc-hub", {"--port", hub.url.substr(hub.url.rfind(':') + 1)}), 1);
   EXPECT_NE(errors("loc-hub").find("cannot listen"), std::string::npos) << errors("loc-hub");

@@ -10,6 +10,7 @@
 #include "libloc/io/lcm_log.hpp"
 #include "libloc/io/tum.hpp"
 #include "msgs/convert.hpp"
+#include "tools/support/program.hpp"
 
 namespace loc {
 namespace {
@@ -90,7 +91,8 @@ std::unique_ptr<EstimateOutput> open_estimate_output(const std::string& path, co
   const std::string extension = std::filesystem::path(path).extension();
   if (extension == ".csv") return std::make_unique<CsvOutput>(path);
   if (extension == ".tum" || extension == ".txt") return std::make_unique<TumOutput>(path);
-  return std::make_unique<LogOutput>(path, method, world);
+  if (extension == ".lcm" || extension == ".log") return std::make_unique<LogOutput>(path, method, world);
+  throw UsageError(path + ": what to write follows from the ending: .csv, .tum (or .txt), .lcm (or .log)");
 }
 
 }  // namespace loc

@@ -1,4 +1,4 @@
-// Files that estimates go to off line. The kind follows from the name: *.csv, *.tum (or *.txt), all else an LCM log.
+// Files that estimates go to off line. The kind follows from the name: *.csv, *.tum (or *.txt), *.lcm (or *.log).
 #pragma once
 
 #include <memory>
@@ -20,7 +20,7 @@ class EstimateOutput {
 };
 
 /// @param method, world as in estimate_t
-/// @throws DataError when the file cannot be written.
+/// @throws UsageError for another ending, DataError when the file cannot be written.
 std::unique_ptr<EstimateOutput> open_estimate_output(const std::string& path, const std::string& method,
                                                      const std::string& world);
 

@@ -27,4 +27,11 @@ std::unique_ptr<MeasurementSource> open_source(const SourceSpec& spec) {
   throw UsageError("source '" + spec.kind + "' is not euroc, lcm-log, csv or broad");
 }
 
+void refuse_to_overwrite(const std::string& recording, const std::string& output) {
+  std::error_code error;
+  if (std::filesystem::equivalent(recording, output, error) && !error) {
+    throw UsageError(output + " is the recording itself (" + recording + "): the output needs another name");
+  }
+}
+
 }  // namespace loc

@@ -23,4 +23,8 @@ std::string guess_source_kind(const std::string& path);
 /// @throws UsageError for an unknown kind or a path that does not exist, DataError as the reader of that kind.
 std::unique_ptr<MeasurementSource> open_source(const SourceSpec& spec);
 
+/// An output must not replace the recording that is being read, by whatever name it is reached.
+/// @throws UsageError naming both when they are one file.
+void refuse_to_overwrite(const std::string& recording, const std::string& output);
+
 }  // namespace loc
