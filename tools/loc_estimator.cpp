@@ -63,6 +63,9 @@ int run_offline(const Arguments& arguments, loc::AnyEstimator estimator) {
       spdlog::warn("event=skipped source=\"{}\" {}={}", input.path, count.name, count.value);
     }
   }
+  for (const std::string& doubt : pipeline.unit_doubts()) {
+    spdlog::warn("event=implausible_unit source=\"{}\" reason=\"{}\"", input.path, doubt);
+  }
   if (estimates == 0) {
     spdlog::error("event=no_estimate source=\"{}\" reason=\"no IMU sample could be used\"", input.path);
     return loc::kExitFailed;
@@ -75,6 +78,9 @@ int run_live(const Arguments& arguments, loc::AnyEstimator estimator) {
   spdlog::info("event=started method={} preset={} world={} url={}", arguments.method, arguments.preset, arguments.world,
                arguments.live.lcm_url);
   live.run();
+  for (const std::string& doubt : live.unit_doubts()) {
+    spdlog::warn("event=implausible_unit reason=\"{}\"", doubt);
+  }
   spdlog::info("event=ended {} {}", loc::format_counts(live.counts()), loc::format_latency("latency", live.latency()));
   return loc::kExitOk;
 }

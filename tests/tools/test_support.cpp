@@ -19,6 +19,7 @@
 #include "tools/support/pacer.hpp"
 #include "tools/support/pipeline.hpp"
 #include "tools/support/program.hpp"
+#include "tools/support/unit_check.hpp"
 
 namespace loc {
 namespace {
@@ -296,6 +297,28 @@ TEST(EstimateOutput, TumKeepsOneTimeLineAndLosesNothingElse) {
   }
   output->finish();
   EXPECT_EQ(read_tum(path).trajectory.times_ns, (std::vector<TimeNs>{10, 20, 30}));
+}
+
+TEST(UnitCheck, DoubtsUnitsThatPhysicsExcludes) {
+  const auto doubts = [](double force, double field, int samples = 100) {
+    UnitCheck check;
+    for (int i = 0; i < samples; ++i) {
+      ImuMeasurement imu;
+      imu.specific_force = {0, 0, force};
+      MagnetometerMeasurement magnetometer;
+      magnetometer.magnetic_field = {field, 0, 0};
+      check.see(imu);
+      check.see(magnetometer);
+    }
+    return check.doubts();
+  };
+  EXPECT_TRUE(doubts(9.8, 50e-6).empty());
+  EXPECT_TRUE(doubts(std::nan(""), std::nan("")).empty());
+  EXPECT_TRUE(doubts(1, 50, 99).empty()) << "too few to tell";
+  ASSERT_EQ(doubts(1, 50e-6).size(), 1U);  // g
+  EXPECT_NE(doubts(1, 50e-6)[0].find("force is 1 m/s^2"), std::string::npos);
+  ASSERT_EQ(doubts(9.8 * 9.8, 48).size(), 2U);  // m/s^2 read as g, uT read as T
+  EXPECT_NE(doubts(9.8, 48)[0].find("field is 48 T"), std::string::npos);
 }
 
 }  // namespace

@@ -37,6 +37,7 @@ class LiveEstimator {
   void run();
   /// Everything that was counted, for statistics and the last line.
   NamedCounts counts() const;
+  std::vector<std::string> unit_doubts() const { return pipeline_.unit_doubts(); }
   /// From publishing a sample (its host_time_ns) to publishing its estimate.
   const LatencyHistogram& latency() const { return latency_; }
   /// Samples of a stream that may not lose any were lost before the estimator: dropped by a full queue.

@@ -67,7 +67,9 @@ void EstimatorPipeline::push(Measurement measurement) {
   }
   sequences_.see(measurement);
   const std::int64_t resets = merger_.counts().resets;
-  merger_.push(calibrated(rig_, std::move(measurement)));
+  measurement = calibrated(rig_, std::move(measurement));
+  units_.see(measurement);
+  merger_.push(std::move(measurement));
   if (merger_.counts().resets != resets) {
     // All that had waited leaves first; the clock was set back between it and this sample.
     for (std::size_t before = merger_.waiting() - 1; before > 0; --before) process(*merger_.pop());

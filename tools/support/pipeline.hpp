@@ -13,6 +13,7 @@
 #include "libloc/sensors/rig.hpp"
 #include "libloc/sensors/stream.hpp"
 #include "tools/support/any_estimator.hpp"
+#include "tools/support/unit_check.hpp"
 
 namespace loc {
 
@@ -53,6 +54,8 @@ class EstimatorPipeline {
   std::int64_t estimates() const { return estimates_; }
   /// Received, lost, late and so on for each stream that the estimator takes, and the estimator's own counts.
   NamedCounts counts() const;
+  /// What looks like a wrong unit in the calibrated measurements, for the user; empty when all is plausible.
+  std::vector<std::string> unit_doubts() const { return units_.doubts(); }
 
  private:
   void drain();
@@ -64,6 +67,7 @@ class EstimatorPipeline {
   StreamMerger merger_;
   StreamMergerCounts earlier_;  // of the recordings before this one
   SequenceCheck sequences_;
+  UnitCheck units_;
   Sink sink_;
   bool ended_ = false;
   std::int64_t estimates_ = 0;
