@@ -186,15 +186,18 @@ std::uint32_t MadgwickFilter::update(const MagnetometerMeasurement& magnetometer
     skipped_status_ |= reason;
     return reason;
   };
-  if (!field.allFinite()) return refuse(counts_.magnetometer_not_finite, kNotFinite);
-  if (field.cwiseAbs().maxCoeff() > kMaxField) return refuse(counts_.magnetometer_out_of_range, kOutOfRange);
+  const double norm2 = field.squaredNorm();
+  if (!(norm2 <= kMaxField * kMaxField)) {
+    return field.allFinite() ? refuse(counts_.magnetometer_out_of_range, kOutOfRange)
+                             : refuse(counts_.magnetometer_not_finite, kNotFinite);
+  }
   const TimeLine::Verdict verdict = field_time_line_.judge(magnetometer.time_ns);
   if (verdict == TimeLine::Verdict::kNotIncreasing) {
     return refuse(counts_.magnetometer_time_not_increasing, kTimeNotIncreasing);
   }
   if (verdict == TimeLine::Verdict::kSetBack) forget_field();
   ++counts_.magnetometer;
-  field_norm_ = field.norm();
+  field_norm_ = std::sqrt(norm2);
   field_ = field_norm_ > kMinField ? Eigen::Vector3d(field / field_norm_) : Eigen::Vector3d::Zero();
   field_sample_time_ = magnetometer.time_ns;
   field_time_ = magnetometer.time_ns;
@@ -391,7 +394,9 @@ Eigen::Vector3d MadgwickFilter::magnetic_gradient(const Eigen::Matrix3d& R, cons
 
 std::uint32_t MadgwickFilter::update(const ImuMeasurement& imu) {
   const double max_rate = options_.max_angular_velocity;
-  if (!(imu.angular_velocity.squaredNorm() <= max_rate * max_rate && imu.specific_force.allFinite())) {
+  const double force2 = imu.specific_force.squaredNorm();
+  // Both comparisons are false for NaN; the force's own limit comes below.
+  if (!(imu.angular_velocity.squaredNorm() <= max_rate * max_rate && force2 < kInfinity)) {
     const bool finite = imu.angular_velocity.allFinite() && imu.specific_force.allFinite();
     ++(finite ? counts_.imu_out_of_range : counts_.imu_not_finite);
     return skip(finite ? kOutOfRange : kNotFinite);
@@ -423,7 +428,6 @@ std::uint32_t MadgwickFilter::update(const ImuMeasurement& imu) {
       break;
   }
   const double max_force = options_.max_specific_force;
-  const double force2 = imu.specific_force.squaredNorm();
   const bool has_force = force2 > kMinForce * kMinForce && force2 <= max_force * max_force;
   if (!initialised_ && !has_force) {
     ++counts_.accelerometer_ignored;
