@@ -56,9 +56,10 @@ struct MadgwickOptions {
   /// Low-pass of the specific force in world axes, where acceleration averages out and gravity stays. 0: none. [s]
   double accelerometer_time_constant_s = 0;
 
-  /// For this long after the start attitude and heading follow the averaged force and the field as a mean over all
-  /// samples so far (gain 1/elapsed), because a start in motion is far off and a small beta would take long to mend it;
-  /// no field is rejected until then. 0: none (the report). [s]
+  /// For this long after the start the gain is raised, because a start in motion is far off and a small beta would take
+  /// long to mend it: for one time constant of the force the tilt follows the averaged force and the heading a short
+  /// mean of the field, then both go on as a mean over all samples (gain 1/elapsed). No field is rejected until the end
+  /// of it. 0: none (the report). [s]
   double start_time_s = 0;
 
   /// Estimate the gyroscope's bias while at rest.
