@@ -23,6 +23,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "libloc/calib/sphere_coverage.hpp"
 #include "libloc/core/quality.hpp"
@@ -106,18 +107,24 @@ struct EllipsoidAdvice {
 class EllipsoidCollector {
  public:
   /// @param readings_per_cell kept for each of the cells of SphereCoverage
+  /// @throws std::invalid_argument naming the option and its value.
   explicit EllipsoidCollector(EllipsoidOptions options = {}, int readings_per_cell = 20);
-  /// Readings that are not finite are counted and left out.
-  void add(const Eigen::Vector3d& reading);
+  /// false when it is not finite: counted and left out.
+  bool add(const Eigen::Vector3d& reading);
   /// Of what is kept now; computed anew at each call (some ms).
   EllipsoidFit fit() const;
   EllipsoidAdvice advice(const EllipsoidFit& fit) const;
   std::int64_t received() const { return received_; }
 
  private:
+  std::size_t capacity() const;
+  std::vector<Eigen::Vector3d> thinned() const;
+
   EllipsoidOptions options_;
   int readings_per_cell_;
+  std::vector<Eigen::Vector3d> kept_;
   std::int64_t received_ = 0;
+  std::int64_t not_finite_ = 0;
 };
 
 }  // namespace loc
