@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "libloc/core/check.hpp"
+
 namespace loc {
 
 const char* verdict_name(Verdict verdict) {
@@ -17,6 +19,13 @@ const char* verdict_name(Verdict verdict) {
       return "refused";
   }
   return "unknown";
+}
+
+Verdict parse_verdict(const std::string& name) {
+  for (const Verdict verdict : {Verdict::kOk, Verdict::kFair, Verdict::kWarn, Verdict::kRefused}) {
+    if (name == verdict_name(verdict)) return verdict;
+  }
+  throw std::invalid_argument("verdict = '" + name + "': must be ok, fair, warn or refused");
 }
 
 void Quality::lower_to(Verdict at_most, std::string reason) {

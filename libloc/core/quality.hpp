@@ -16,6 +16,8 @@ enum class Verdict : std::uint8_t {
 };
 /// "ok", "fair", "warn", "refused"
 const char* verdict_name(Verdict verdict);
+/// @throws std::invalid_argument naming the text.
+Verdict parse_verdict(const std::string& name);
 
 struct Quality {
   Verdict verdict = Verdict::kOk;

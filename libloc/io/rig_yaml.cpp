@@ -27,10 +27,33 @@ const char* name_of(DistortionModel model) {
   return "none";
 }
 
+double optional_number(YamlBlock& block, const char* key) {
+  return block.has(key) ? block.number(key) : kUnknown;
+}
+
+TriadQuality read_quality(YamlBlock block) {
+  TriadQuality quality;
+  const std::string verdict = block.text("verdict");
+  try {
+    quality.verdict = parse_verdict(verdict);
+  } catch (const std::invalid_argument&) {
+    block.fail("verdict", "= '" + verdict + "' is not ok, fair, warn or refused");
+  }
+  quality.method = block.text("method");
+  quality.samples = block.integer("samples");
+  if (block.has("bias_sigma")) quality.bias_sigma = block.vector3("bias_sigma");
+  if (block.has("matrix_sigma")) quality.matrix_sigma = block.matrix("matrix_sigma", 3, 3);
+  quality.residual_rms = optional_number(block, "residual_rms");
+  quality.reasons = block.texts("reasons");
+  block.finish();
+  return quality;
+}
+
 TriadCalibration read_triad(YamlBlock block) {
   TriadCalibration triad;
   triad.bias = block.vector3("bias");
   triad.matrix = block.matrix("matrix", 3, 3);
+  if (block.has("quality")) triad.quality = read_quality(block.block("quality"));
   block.finish();
   return triad;
 }
@@ -45,6 +68,7 @@ ImuCalibration read_imu(YamlBlock block) {
   imu.noise.accelerometer_random_walk = noise.number("accelerometer_random_walk");
   imu.noise.gyroscope_bias_sigma = noise.number("gyroscope_bias_sigma");
   imu.noise.accelerometer_bias_sigma = noise.number("accelerometer_bias_sigma");
+  if (noise.has("measured")) imu.noise_measured = noise.texts("measured");
   noise.finish();
   imu.gyroscope = read_triad(block.block("gyroscope"));
   imu.accelerometer = read_triad(block.block("accelerometer"));
@@ -94,6 +118,28 @@ CameraCalibration read_camera(YamlBlock block) {
   return camera;
 }
 
+GpsCalibration read_gps(YamlBlock block) {
+  GpsCalibration gps;
+  gps.antenna_in_body = block.vector3("antenna_in_body");
+  if (block.has("time_offset_s")) gps.time_offset_s = block.number("time_offset_s");
+  gps.time_offset_sigma_s = optional_number(block, "time_offset_sigma_s");
+  block.finish();
+  return gps;
+}
+
+ClockCalibration read_clock(YamlBlock block) {
+  ClockCalibration clock;
+  clock.stream = block.text("stream");
+  clock.reference = block.text("reference");
+  clock.skew_ppm = block.number("skew_ppm");
+  clock.skew_sigma_ppm = optional_number(block, "skew_sigma_ppm");
+  clock.offset_sigma_s = optional_number(block, "offset_sigma_s");
+  clock.jitter_rms_s = optional_number(block, "jitter_rms_s");
+  clock.jitter_p99_s = optional_number(block, "jitter_p99_s");
+  block.finish();
+  return clock;
+}
+
 // Numbers are handed over as text: the emitter would round them.
 template <class Vector>
 void emit_list(YAML::Emitter& out, const Vector& values) {
@@ -112,12 +158,41 @@ void emit_number(YAML::Emitter& out, const char* key, double value) {
   out << YAML::Key << key << YAML::Value << text;
 }
 
+void emit_if_known(YAML::Emitter& out, const char* key, double value) {
+  if (!std::isnan(value)) emit_number(out, key, value);
+}
+
+void emit_matrix(YAML::Emitter& out, const char* key, const Eigen::Matrix3d& matrix) {
+  out << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginSeq;
+  for (int i = 0; i < 3; ++i) emit_list(out, Eigen::Vector3d(matrix.row(i)));
+  out << YAML::EndSeq;
+}
+
+void emit_quality(YAML::Emitter& out, const TriadQuality& quality) {
+  out << YAML::Key << "quality" << YAML::Value << YAML::BeginMap;
+  out << YAML::Key << "verdict" << YAML::Value << verdict_name(quality.verdict);
+  out << YAML::Key << "method" << YAML::Value << YAML::DoubleQuoted << quality.method;
+  out << YAML::Key << "samples" << YAML::Value << std::to_string(quality.samples);
+  if (!quality.bias_sigma.hasNaN()) {
+    out << YAML::Key << "bias_sigma" << YAML::Value;
+    emit_list(out, quality.bias_sigma);
+  }
+  if (!quality.matrix_sigma.hasNaN()) emit_matrix(out, "matrix_sigma", quality.matrix_sigma);
+  emit_if_known(out, "residual_rms", quality.residual_rms);
+  out << YAML::Key << "reasons" << YAML::Value;
+  // A flow list keeps an empty one on its line; sentences get a line each.
+  if (quality.reasons.empty()) out << YAML::Flow;
+  out << YAML::BeginSeq;
+  for (const std::string& reason : quality.reasons) out << YAML::DoubleQuoted << reason;
+  out << YAML::EndSeq << YAML::EndMap;
+}
+
 void emit_triad(YAML::Emitter& out, const TriadCalibration& triad) {
   out << YAML::BeginMap << YAML::Key << "bias" << YAML::Value;
   emit_list(out, triad.bias);
-  out << YAML::Key << "matrix" << YAML::Value << YAML::Flow << YAML::BeginSeq;
-  for (int i = 0; i < 3; ++i) emit_list(out, Eigen::Vector3d(triad.matrix.row(i)));
-  out << YAML::EndSeq << YAML::EndMap;
+  emit_matrix(out, "matrix", triad.matrix);
+  if (triad.quality) emit_quality(out, *triad.quality);
+  out << YAML::EndMap;
 }
 
 void emit_imu(YAML::Emitter& out, const ImuCalibration& imu) {
@@ -130,10 +205,33 @@ void emit_imu(YAML::Emitter& out, const ImuCalibration& imu) {
   emit_number(out, "accelerometer_random_walk", imu.noise.accelerometer_random_walk);
   emit_number(out, "gyroscope_bias_sigma", imu.noise.gyroscope_bias_sigma);
   emit_number(out, "accelerometer_bias_sigma", imu.noise.accelerometer_bias_sigma);
+  if (!imu.noise_measured.empty()) {
+    out << YAML::Key << "measured" << YAML::Value << YAML::Flow << imu.noise_measured;
+  }
   out << YAML::EndMap << YAML::Key << "gyroscope" << YAML::Value;
   emit_triad(out, imu.gyroscope);
   out << YAML::Key << "accelerometer" << YAML::Value;
   emit_triad(out, imu.accelerometer);
+  out << YAML::EndMap;
+}
+
+void emit_gps(YAML::Emitter& out, const GpsCalibration& gps) {
+  out << YAML::Key << "gps" << YAML::Value << YAML::BeginMap << YAML::Key << "antenna_in_body" << YAML::Value;
+  emit_list(out, gps.antenna_in_body);
+  emit_number(out, "time_offset_s", gps.time_offset_s);
+  emit_if_known(out, "time_offset_sigma_s", gps.time_offset_sigma_s);
+  out << YAML::EndMap;
+}
+
+void emit_clock(YAML::Emitter& out, const ClockCalibration& clock) {
+  out << YAML::BeginMap;
+  out << YAML::Key << "stream" << YAML::Value << YAML::DoubleQuoted << clock.stream;
+  out << YAML::Key << "reference" << YAML::Value << YAML::DoubleQuoted << clock.reference;
+  emit_number(out, "skew_ppm", clock.skew_ppm);
+  emit_if_known(out, "skew_sigma_ppm", clock.skew_sigma_ppm);
+  emit_if_known(out, "offset_sigma_s", clock.offset_sigma_s);
+  emit_if_known(out, "jitter_rms_s", clock.jitter_rms_s);
+  emit_if_known(out, "jitter_p99_s", clock.jitter_p99_s);
   out << YAML::EndMap;
 }
 
@@ -174,10 +272,9 @@ Rig read_rig(const std::filesystem::path& path) {
   if (file.has("cameras")) {
     for (YamlBlock& block : file.blocks("cameras")) rig.cameras.push_back(read_camera(std::move(block)));
   }
-  if (file.has("gps")) {
-    YamlBlock gps = file.block("gps");
-    rig.gps = GpsCalibration{gps.vector3("antenna_in_body")};
-    gps.finish();
+  if (file.has("gps")) rig.gps = read_gps(file.block("gps"));
+  if (file.has("clocks")) {
+    for (YamlBlock& block : file.blocks("clocks")) rig.clocks.push_back(read_clock(std::move(block)));
   }
   file.finish();
   io::as_data_error(path, [&] { rig.check(); });
@@ -198,15 +295,25 @@ void write_rig(const std::filesystem::path& path, const Rig& rig) {
     for (const CameraCalibration& camera : rig.cameras) emit_camera(out, camera);
     out << YAML::EndSeq;
   }
-  if (rig.gps) {
-    out << YAML::Key << "gps" << YAML::Value << YAML::BeginMap << YAML::Key << "antenna_in_body" << YAML::Value;
-    emit_list(out, rig.gps->antenna_in_body);
-    out << YAML::EndMap;
+  if (rig.gps) emit_gps(out, *rig.gps);
+  if (!rig.clocks.empty()) {
+    out << YAML::Key << "clocks" << YAML::Value << YAML::BeginSeq;
+    for (const ClockCalibration& clock : rig.clocks) emit_clock(out, clock);
+    out << YAML::EndSeq;
   }
   out << YAML::EndMap;
   io::AtomicFile file(path);
   file.stream() << out.c_str() << "\n...\n";
   file.commit();
+}
+
+Rig update_rig(const std::filesystem::path& path, const std::function<void(Rig&)>& change) {
+  // A link that leads nowhere is no missing file: reading says so.
+  const bool absent = !std::filesystem::exists(io::status_of(path)) && !std::filesystem::is_symlink(path);
+  Rig rig = absent ? Rig{} : read_rig(path);
+  change(rig);
+  write_rig(path, rig);
+  return rig;
 }
 
 }  // namespace loc

@@ -12,9 +12,18 @@
 //       accelerometer_random_walk: 3.0e-3     # [m/s^3/sqrt(Hz)]
 //       gyroscope_bias_sigma: 1.0e-2          # [rad/s], turn-on
 //       accelerometer_bias_sigma: 0.2         # [m/s^2], turn-on
+//       measured: [gyroscope_noise_density]   # optional: those that were measured; the others are guesses
 //     gyroscope:                              # corrected = matrix * (raw - bias)
 //       bias: [0, 0, 0]                       # [rad/s]
 //       matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+//       quality:                              # optional, of every triad: how it was found
+//         verdict: ok                         # ok, fair, warn, refused (and written all the same)
+//         method: still-poses
+//         samples: 1500
+//         bias_sigma: [0, 0, 0]               # optional, unit of the bias: one standard deviation
+//         matrix_sigma: [[0, 0, 0], …]        # optional
+//         residual_rms: 0.001                 # optional, relative to the field's norm
+//         reasons: ["one sentence", "another"]
 //     accelerometer:                          # likewise [m/s^2]
 //   magnetometer:                             # likewise [T]
 //     bias: [0, 0, 0]
@@ -32,9 +41,20 @@
 //       rate_hz: 20
 //   gps:
 //     antenna_in_body: [0, 0, 0]              # [m]
+//     time_offset_s: 0                        # optional: t_imu = t_gps + time_offset_s
+//     time_offset_sigma_s: 0.01               # optional
+//   clocks:                                   # of the streams that have a clock of their own
+//     - stream: imu
+//       reference: host                       # the clock that it was compared with: host, gps
+//       skew_ppm: 50                          # seconds of the reference per second of the stream, less 1
+//       skew_sigma_ppm: 0.01                  # optional, and so are all that follow
+//       offset_sigma_s: 2.0e-6                # of a time that was put on the reference clock
+//       jitter_rms_s: 1.0e-3                  # of arrivals after the earliest possible
+//       jitter_p99_s: 6.0e-3
 //   ...                                       # end of the document: without it the file counts as cut
 //
-// In a block every key must be there, and no other: a misspelt key is an error, not a default. Quaternions are
+// In a block every key that is not marked optional must be there, and no other: a misspelt key is an error, not a
+// default. An optional number that is left out is not known. Quaternions are
 // normalised when their norm is within 1e-2 of 1 and farther from it than 1e-9.
 //
 // Kalibr's T_cam_imu takes imu coordinates to the camera's: it is the inverse of T_body_camera here. EuRoC's T_BS takes
@@ -42,6 +62,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 
 #include "libloc/sensors/rig.hpp"
 
@@ -53,6 +74,12 @@ Rig read_rig(const std::filesystem::path& path);
 /// Writes beside the file and renames, so that a reader sees the old or the new one, never half. read_rig() gives back
 /// the same numbers bit for bit. @throws std::invalid_argument from Rig::check(), DataError when it cannot be written.
 void write_rig(const std::filesystem::path& path, const Rig& rig);
+
+/// Changes a part of a rig file and keeps the rest: reads it (an empty rig when there is no such file), calls change,
+/// writes it with write_rig(). The numbers of what is kept stay as they were to the last bit; comments and the layout
+/// of a file written by hand do not. When anything throws, the file stays as it was. @return the rig that was written
+/// @throws what read_rig(), change and write_rig() throw.
+Rig update_rig(const std::filesystem::path& path, const std::function<void(Rig&)>& change);
 
 /// Kalibr's camchain (cam0, cam1, …: T_cam_imu, camera_model pinhole, intrinsics, distortion_model radtan, equidistant
 /// or none, distortion_coeffs, resolution, timeshift_cam_imu). A chain without IMU has T_cn_cnm1 only: cam0 is then

@@ -103,6 +103,24 @@ std::string YamlBlock::text(const char* key) {
   return node.Scalar();
 }
 
+std::int64_t YamlBlock::integer(const char* key) {
+  const YAML::Node node = get(key);
+  const auto value = node.IsScalar() ? parse_integer(node.Scalar()) : std::nullopt;
+  if (!value) fail(key, "= '" + (node.IsScalar() ? node.Scalar() : "(not a scalar)") + "' is not a whole number");
+  return *value;
+}
+
+std::vector<std::string> YamlBlock::texts(const char* key) {
+  const YAML::Node node = get(key);
+  if (!node.IsSequence()) fail(key, "must be a list of words");
+  std::vector<std::string> list;
+  for (const auto& entry : node) {
+    if (!entry.IsScalar() || entry.Scalar().empty()) fail(key, "must be a list of words");
+    list.push_back(entry.Scalar());
+  }
+  return list;
+}
+
 std::vector<double> YamlBlock::numbers(const char* key, int size) {
   const YAML::Node node = get(key);
   if (!node.IsSequence() || (size >= 0 && node.size() != static_cast<std::size_t>(size))) {

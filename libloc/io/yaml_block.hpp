@@ -4,6 +4,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <filesystem>
 #include <set>
 #include <string>
@@ -36,7 +37,10 @@ class YamlBlock {
   /// In the order of the file.
   std::vector<std::string> keys() const;
   double number(const char* key);
+  std::int64_t integer(const char* key);
   std::string text(const char* key);
+  /// A list of words.
+  std::vector<std::string> texts(const char* key);
   /// size < 0: any
   std::vector<double> numbers(const char* key, int size);
   Eigen::Vector3d vector3(const char* key);

@@ -3,6 +3,9 @@
 // navigation", 2006, for the discretisation.
 #pragma once
 
+#include <array>
+#include <string_view>
+
 namespace loc {
 
 struct ImuNoise {
@@ -16,6 +19,11 @@ struct ImuNoise {
   /// @throws std::invalid_argument naming the field and its value.
   void check() const;
 };
+
+/// Names of ImuNoise's fields, in their order: as files write them.
+inline constexpr std::array<std::string_view, 6> kImuNoiseFields = {
+    "gyroscope_noise_density",   "gyroscope_random_walk", "accelerometer_noise_density",
+    "accelerometer_random_walk", "gyroscope_bias_sigma",  "accelerometer_bias_sigma"};
 
 /// Deviations of samples dt apart.
 struct DiscreteImuNoise {

@@ -1,11 +1,44 @@
 #include "libloc/sensors/rig.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "libloc/core/check.hpp"
 
 namespace loc {
+namespace {
+
+// A difference larger than this is a matter of the clock model, not of a sensor's latency.
+constexpr double kLargestGpsOffset = 86'400;  // [s]
+// No oscillator is that wrong: a unit was mistaken.
+constexpr double kLargestSkew = 10'000;  // [ppm]
+
+// One line of print: it becomes a line of a log.
+void require_line(const std::string& name, const std::string& text) {
+  require(!text.empty(), name + ": must not be empty");
+  const bool print = std::ranges::none_of(text, [](char c) { return static_cast<unsigned char>(c) < ' '; });
+  require(print, name + ": must be one line without control characters");
+}
+
+void require_known_or_not_negative(const std::string& name, double value) {
+  require(std::isnan(value) || (std::isfinite(value) && value >= 0), name, value, "must not be negative, and finite");
+}
+
+}  // namespace
+
+void TriadQuality::check(const std::string& name) const {
+  require_line(name + ".method", method);
+  require(samples >= 0, name + ".samples", static_cast<double>(samples), "must not be negative");
+  // Known or unknown as a whole: half of a matrix says nothing.
+  const auto whole = [](const auto& m) { return m.array().isNaN().all() || (m.allFinite() && (m.array() >= 0).all()); };
+  require(whole(bias_sigma), name + ".bias_sigma: must not be negative, and finite (or all NaN: unknown)");
+  require(whole(matrix_sigma), name + ".matrix_sigma: must not be negative, and finite (or all NaN: unknown)");
+  require_known_or_not_negative(name + ".residual_rms", residual_rms);
+  for (const std::string& reason : reasons) require_line(name + ".reasons", reason);
+}
 
 void TriadCalibration::check(const std::string& name) const {
   require(bias.allFinite(), name + ".bias: must be finite");
@@ -13,12 +46,29 @@ void TriadCalibration::check(const std::string& name) const {
   // Relative to the size of the entries: a magnetometer calibration may carry a unit.
   const double scale = matrix.cwiseAbs().maxCoeff();
   require(scale > 0 && std::abs((matrix / scale).determinant()) > 1e-9, name + ".matrix: must not be singular");
+  if (quality) quality->check(name + ".quality");
+}
+
+void ClockCalibration::check() const {
+  require_line("clocks.stream", stream);
+  require_line("clocks.reference", reference);
+  const std::string name = "clocks." + stream + ".";
+  require(std::abs(skew_ppm) <= kLargestSkew, name + "skew_ppm", skew_ppm, "must be within +-10000");
+  require_known_or_not_negative(name + "skew_sigma_ppm", skew_sigma_ppm);
+  require_known_or_not_negative(name + "offset_sigma_s", offset_sigma_s);
+  require_known_or_not_negative(name + "jitter_rms_s", jitter_rms_s);
+  require_known_or_not_negative(name + "jitter_p99_s", jitter_p99_s);
 }
 
 void Rig::check() const {
   if (imu) {
     require_not_negative("imu.rate_hz", imu->rate_hz);
     imu->noise.check();
+    for (const std::string& field : imu->noise_measured) {
+      const bool known = std::ranges::find(kImuNoiseFields, field) != kImuNoiseFields.end();
+      require(known, "imu.noise_measured: '" + field + "' is not a field of the noise");
+      require(std::ranges::count(imu->noise_measured, field) == 1, "imu.noise_measured: '" + field + "' comes twice");
+    }
     imu->gyroscope.check("imu.gyroscope");
     imu->accelerometer.check("imu.accelerometer");
   }
@@ -35,7 +85,18 @@ void Rig::check() const {
     require_finite(camera.name + ".timeshift_cam_imu", camera.time_offset_s);
     require_not_negative(camera.name + ".rate_hz", camera.rate_hz);
   }
-  if (gps) require(gps->antenna_in_body.allFinite(), "gps.antenna_in_body: must be finite");
+  if (gps) {
+    require(gps->antenna_in_body.allFinite(), "gps.antenna_in_body: must be finite");
+    require(std::abs(gps->time_offset_s) <= kLargestGpsOffset, "gps.time_offset_s", gps->time_offset_s,
+            "must be within a day, and finite");
+    require_known_or_not_negative("gps.time_offset_sigma_s", gps->time_offset_sigma_s);
+  }
+  std::set<std::pair<std::string, std::string>> compared;
+  for (const ClockCalibration& clock : clocks) {
+    clock.check();
+    require(compared.emplace(clock.stream, clock.reference).second,
+            "clocks: stream '" + clock.stream + "' against '" + clock.reference + "' comes twice");
+  }
 }
 
 Measurement calibrated(const Rig& rig, Measurement measurement) {
@@ -44,8 +105,31 @@ Measurement calibrated(const Rig& rig, Measurement measurement) {
     imu->specific_force = rig.imu->accelerometer.apply(imu->specific_force);
   } else if (auto* field = std::get_if<MagnetometerMeasurement>(&measurement); field != nullptr && rig.magnetometer) {
     field->magnetic_field = rig.magnetometer->triad.apply(field->magnetic_field);
+  } else if (auto* fix = std::get_if<GpsMeasurement>(&measurement); fix != nullptr && rig.gps) {
+    // An absurd time that a broken sender can make stays as it is: the merger finds it.
+    TimeNs moved = 0;
+    const bool possible = !__builtin_add_overflow(fix->time_ns, from_seconds(rig.gps->time_offset_s), &moved);
+    if (fix->time_ns != kNoTime && possible) fix->time_ns = moved;
   }
   return measurement;
+}
+
+std::vector<RigDoubt> doubts(const Rig& rig) {
+  std::vector<RigDoubt> out;
+  const auto look = [&](const std::string& block, const TriadCalibration& triad) {
+    if (!triad.quality || triad.quality->verdict < Verdict::kWarn) return;
+    std::string text = triad.quality->verdict == Verdict::kRefused
+                           ? "the calibration was refused and written all the same (forced)"
+                           : "the calibration came with a warning";
+    for (const std::string& reason : triad.quality->reasons) text += "; " + reason;
+    out.push_back({block, triad.quality->verdict, text});
+  };
+  if (rig.imu) {
+    look("imu.gyroscope", rig.imu->gyroscope);
+    look("imu.accelerometer", rig.imu->accelerometer);
+  }
+  if (rig.magnetometer) look("magnetometer", rig.magnetometer->triad);
+  return out;
 }
 
 }  // namespace loc

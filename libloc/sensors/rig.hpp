@@ -2,10 +2,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "libloc/core/quality.hpp"
 #include "libloc/core/time.hpp"
 #include "libloc/geometry/pose3.hpp"
 #include "libloc/sensors/imu_noise.hpp"
@@ -13,10 +16,25 @@
 
 namespace loc {
 
+/// How a triad's calibration was found, and how far it may be trusted. A deviation that was not estimated is NaN.
+struct TriadQuality {
+  Verdict verdict = Verdict::kOk;
+  std::string method;        ///< "robust", "still-poses", …
+  std::int64_t samples = 0;  ///< readings (of still poses: poses) that were used
+  Eigen::Vector3d bias_sigma = Eigen::Vector3d::Constant(kUnknown);    ///< deviation of the bias, in its unit
+  Eigen::Matrix3d matrix_sigma = Eigen::Matrix3d::Constant(kUnknown);  ///< of each entry, in the matrix's unit
+  double residual_rms = kUnknown;    ///< of the corrected readings' norm, relative to the field's norm
+  std::vector<std::string> reasons;  ///< of the verdict, one line each
+
+  /// @throws std::invalid_argument naming the field. @param name goes into the message.
+  void check(const std::string& name) const;
+};
+
 /// corrected = matrix * (raw - bias)
 struct TriadCalibration {
   Eigen::Vector3d bias = Eigen::Vector3d::Zero();        ///< in the sensor's unit
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();  ///< scale, misalignment, soft iron, rotation to body
+  std::optional<TriadQuality> quality;                   ///< none: nobody measured it, or the file does not say
 
   Eigen::Vector3d apply(const Eigen::Vector3d& raw) const { return matrix * (raw - bias); }
   /// @throws std::invalid_argument when not finite or the matrix is singular. @param name goes into the message.
@@ -26,8 +44,9 @@ struct TriadCalibration {
 struct ImuCalibration {
   double rate_hz = 0;  ///< nominal; 0 when unknown
   ImuNoise noise;
-  TriadCalibration gyroscope;      ///< [rad/s]
-  TriadCalibration accelerometer;  ///< [m/s^2]
+  std::vector<std::string> noise_measured;  ///< names of the fields of noise that were measured; the others are guesses
+  TriadCalibration gyroscope;               ///< [rad/s]
+  TriadCalibration accelerometer;           ///< [m/s^2]
 };
 
 struct MagnetometerCalibration {
@@ -50,6 +69,22 @@ struct CameraCalibration {
 
 struct GpsCalibration {
   Eigen::Vector3d antenna_in_body = Eigen::Vector3d::Zero();  ///< lever arm [m]
+  double time_offset_s = 0;                                   ///< t_imu = t_gps + time_offset
+  double time_offset_sigma_s = kUnknown;                      ///< deviation of the offset; NaN: not measured
+};
+
+/// What is known of the clock that stamps a stream: start values for the live clock model, and figures to judge it by.
+struct ClockCalibration {
+  std::string stream;              ///< "imu", "magnetometer", "gps", a camera's name, …
+  std::string reference = "host";  ///< the clock that it was compared with: "host", "gps"
+  double skew_ppm = 0;             ///< seconds of the reference per second of the stream's clock, less 1
+  double skew_sigma_ppm = kUnknown;
+  double offset_sigma_s = kUnknown;  ///< deviation of a time that was put on the reference clock
+  double jitter_rms_s = kUnknown;    ///< of arrivals after the earliest possible (the lower envelope)
+  double jitter_p99_s = kUnknown;    ///< 99 % of arrivals are at most that late
+
+  /// @throws std::invalid_argument naming the stream and the field.
+  void check() const;
 };
 
 /// The sensors of one device; the body frame is the IMU's.
@@ -58,13 +93,24 @@ struct Rig {
   std::optional<MagnetometerCalibration> magnetometer;
   std::vector<CameraCalibration> cameras;
   std::optional<GpsCalibration> gps;
+  std::vector<ClockCalibration> clocks;  ///< at most one of a stream against a reference
 
   /// @throws std::invalid_argument naming the field and its value.
   void check() const;
 };
 
-/// The measurement as the rig's calibration corrects it: gyroscope, accelerometer and magnetometer; other streams and
-/// sensors without calibration pass unchanged.
+/// The measurement as the rig's calibration corrects it: gyroscope, accelerometer and magnetometer, and the time of a
+/// GPS fix. Other streams and sensors without calibration pass unchanged.
+/// To be called before streams are merged in time order, because of the GPS's time.
 Measurement calibrated(const Rig& rig, Measurement measurement);
+
+/// What a user should hear about a rig before it is used: a sentence for each calibration that was refused (and written
+/// all the same) or came with a warning.
+struct RigDoubt {
+  std::string block;  ///< "imu.gyroscope", "imu.accelerometer", "magnetometer"
+  Verdict verdict = Verdict::kWarn;
+  std::string text;
+};
+std::vector<RigDoubt> doubts(const Rig& rig);
 
 }  // namespace loc

@@ -228,6 +228,21 @@ void bind_io(py::module_& m) {
         "rig.yaml, Kalibr's camchain or imu.yaml, EuRoC's sensor.yaml: whichever it is.");
   m.def("write_rig", &loc::write_rig, py::arg("path"), py::arg("rig"),
         "Writes rig.yaml; read_rig gives the same numbers back.");
+  m.def(
+      "update_rig",
+      [](const fs::path& path, const py::typing::Callable<void(py::object)>& change) {
+        return loc::update_rig(path, [&](loc::Rig& rig) {
+          // Python gets its own copy: it may keep it.
+          const py::object own = py::cast(rig);
+          change(own);
+          rig = own.cast<loc::Rig>();
+        });
+      },
+      py::arg("path"), py::arg("change"),
+      "Reads rig.yaml (an empty rig when there is none), calls change(rig), which alters it, and writes it. What is "
+      "not "
+      "changed stays as it was to the last bit, but comments are lost. When anything raises, the file stays as it "
+      "was.");
 }
 
 }  // namespace locpy

@@ -4,6 +4,7 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "libloc/core/quality.hpp"
 #include "libloc/sensors/imu_noise.hpp"
 #include "libloc/sensors/measurements.hpp"
 #include "libloc/sensors/rig.hpp"
@@ -12,6 +13,7 @@ namespace locpy {
 namespace {
 
 using loc::CameraCalibration;
+using loc::ClockCalibration;
 using loc::GpsCalibration;
 using loc::GpsMeasurement;
 using loc::ImageMeasurement;
@@ -24,6 +26,7 @@ using loc::ReferenceMeasurement;
 using loc::Rig;
 using loc::Stamp;
 using loc::TriadCalibration;
+using loc::TriadQuality;
 
 /// A property that is a vector (3,): Python gets a copy, because a view would let it write past the checks.
 template <class Class, class T>
@@ -196,24 +199,79 @@ void bind_noise(py::module_& m) {
   m.def("discretise", &loc::discretise, py::arg("noise"), py::arg("dt_s"), "Deviations of samples dt_s [s] apart.");
 }
 
+void bind_quality(py::module_& m) {
+  py::native_enum<loc::Verdict>(m, "Verdict", "enum.IntEnum",
+                                "What a calibration says about itself, from best to worst. REFUSED: not to be used "
+                                "unless the user insists.")
+      .value("OK", loc::Verdict::kOk)
+      .value("FAIR", loc::Verdict::kFair)
+      .value("WARN", loc::Verdict::kWarn)
+      .value("REFUSED", loc::Verdict::kRefused)
+      .finalize();
+  py::class_<TriadQuality> quality(m, "TriadQuality",
+                                   "How a triad's calibration was found, and how far it may be trusted. A deviation "
+                                   "that was not estimated is NaN.");
+  quality.def(py::init<>())
+      .def_readwrite("verdict", &TriadQuality::verdict)
+      .def_readwrite("method", &TriadQuality::method, "\"robust\", \"still-poses\", ...")
+      .def_readwrite("samples", &TriadQuality::samples, "readings (of still poses: poses) that were used")
+      .def_readwrite("residual_rms", &TriadQuality::residual_rms, "of the norm, relative to the field's norm")
+      .def_property(
+          "reasons", [](const TriadQuality& self) { return self.reasons; },
+          [](TriadQuality& self, std::vector<std::string> reasons) { self.reasons = std::move(reasons); },
+          "Copies of the sentences, one line each: assign a list to change them.");
+  vector_property(quality, "bias_sigma", &TriadQuality::bias_sigma, "deviation of the bias (3,), in its unit");
+  matrix_property(quality, "matrix_sigma", &TriadQuality::matrix_sigma, "deviation of each entry (3, 3)");
+}
+
+void bind_clock_calibration(py::module_& m) {
+  py::class_<ClockCalibration>(m, "ClockCalibration",
+                               "What is known of the clock that stamps a stream. A figure that is not known is NaN.")
+      .def(py::init([](std::string stream, std::string reference) {
+             ClockCalibration clock;
+             clock.stream = std::move(stream);
+             clock.reference = std::move(reference);
+             return clock;
+           }),
+           py::arg("stream"), py::arg("reference") = "host")
+      .def_readwrite("stream", &ClockCalibration::stream, "\"imu\", \"gps\", a camera's name, ...")
+      .def_readwrite("reference", &ClockCalibration::reference, "the clock it was compared with: \"host\", \"gps\"")
+      .def_readwrite("skew_ppm", &ClockCalibration::skew_ppm,
+                     "seconds of the reference per second of the stream's clock, less 1 [1e-6]")
+      .def_readwrite("skew_sigma_ppm", &ClockCalibration::skew_sigma_ppm)
+      .def_readwrite("offset_sigma_s", &ClockCalibration::offset_sigma_s,
+                     "deviation of a time that was put on the reference clock [s]")
+      .def_readwrite("jitter_rms_s", &ClockCalibration::jitter_rms_s,
+                     "of arrivals after the earliest possible (the lower envelope) [s]")
+      .def_readwrite("jitter_p99_s", &ClockCalibration::jitter_p99_s, "99 % of arrivals are at most that late [s]")
+      .def("check", &ClockCalibration::check, "ValueError names the stream and the field.");
+}
+
 void bind_calibrations(py::module_& m) {
   py::class_<TriadCalibration> triad(m, "TriadCalibration", "corrected = matrix @ (raw - bias)");
   triad.def(py::init<>());
   vector_property(triad, "bias", &TriadCalibration::bias, "(3,), in the sensor's unit");
   matrix_property(triad, "matrix", &TriadCalibration::matrix, "(3, 3): scale, misalignment, soft iron, rotation");
+  triad.def_readwrite("quality", &TriadCalibration::quality, "How it was found; None when nobody has said.");
 
   py::class_<ImuCalibration>(m, "ImuCalibration", "Rate, noise, and how raw samples are corrected.")
       .def(py::init<>())
       .def_readwrite("rate_hz", &ImuCalibration::rate_hz, "nominal; 0 when unknown")
       .def_readwrite("noise", &ImuCalibration::noise)
+      .def_property(
+          "noise_measured", [](const ImuCalibration& self) { return self.noise_measured; },
+          [](ImuCalibration& self, std::vector<std::string> names) { self.noise_measured = std::move(names); },
+          "Copies of the names of the fields of noise that were measured; the others are guesses.")
       .def_readwrite("gyroscope", &ImuCalibration::gyroscope, "[rad/s]")
       .def_readwrite("accelerometer", &ImuCalibration::accelerometer, "[m/s^2]");
   py::class_<MagnetometerCalibration>(m, "MagnetometerCalibration",
                                       "How raw samples are corrected: hard and soft iron.")
       .def(py::init<>())
       .def_readwrite("triad", &MagnetometerCalibration::triad, "[T], result in body axes");
-  py::class_<GpsCalibration> gps(m, "GpsCalibration", "Where the antenna is.");
-  gps.def(py::init<>());
+  py::class_<GpsCalibration> gps(m, "GpsCalibration", "Where the antenna is, and how late its fixes are stamped.");
+  gps.def(py::init<>())
+      .def_readwrite("time_offset_s", &GpsCalibration::time_offset_s, "t_imu = t_gps + time_offset_s")
+      .def_readwrite("time_offset_sigma_s", &GpsCalibration::time_offset_sigma_s, "its deviation; NaN: not measured");
   vector_property(gps, "antenna_in_body", &GpsCalibration::antenna_in_body, "lever arm (3,) [m]");
 
   py::native_enum<loc::DistortionModel>(m, "DistortionModel", "enum.Enum", "What a lens does.")
@@ -245,6 +303,19 @@ void bind_rig(py::module_& m) {
           "cameras", [](const Rig& self) { return self.cameras; },
           [](Rig& self, std::vector<CameraCalibration> cameras) { self.cameras = std::move(cameras); },
           "Copies of the cameras: assign a list to change them.")
+      .def_property(
+          "clocks", [](const Rig& self) { return self.clocks; },
+          [](Rig& self, std::vector<ClockCalibration> clocks) { self.clocks = std::move(clocks); },
+          "Copies of the clocks: assign a list to change them.")
+      .def(
+          "doubts",
+          [](const Rig& self) {
+            std::vector<std::tuple<std::string, loc::Verdict, std::string>> out;
+            for (loc::RigDoubt& d : loc::doubts(self)) out.emplace_back(d.block, d.verdict, d.text);
+            return out;
+          },
+          "(block, verdict, sentence) for each calibration that was refused and written all the same, or came with a "
+          "warning.")
       .def("check", &Rig::check, "ValueError names a field that is out of range.")
       .def(
           "calibrated", [](const Rig& self, const loc::Measurement& raw) { return loc::calibrated(self, raw); },
@@ -256,7 +327,9 @@ void bind_rig(py::module_& m) {
 void bind_sensors(py::module_& m) {
   bind_noise(m);
   bind_measurements(m);
+  bind_quality(m);
   bind_calibrations(m);
+  bind_clock_calibration(m);
   bind_rig(m);
 }
 

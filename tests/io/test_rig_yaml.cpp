@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "libloc/core/random.hpp"
 #include "libloc/io/rig_yaml.hpp"
@@ -22,6 +23,18 @@ TriadCalibration random_triad(Random& random) {
   return triad;
 }
 
+TriadQuality full_quality(Random& random) {
+  TriadQuality quality;
+  quality.verdict = Verdict::kWarn;
+  quality.method = "still-poses";
+  quality.samples = 9'007'199'254'740'993;  // no double
+  quality.bias_sigma = random.normal3().cwiseAbs();
+  for (int i = 0; i < 3; ++i) quality.matrix_sigma.row(i) = random.normal3().cwiseAbs();
+  quality.residual_rms = 1.0 / 7;
+  quality.reasons = {"deviation of the centre: 1.2 % of the radius; turn more", "a \"quoted\" # word, µT", "null"};
+  return quality;
+}
+
 Rig full_rig() {
   Random random(11);
   Rig rig;
@@ -31,6 +44,10 @@ Rig full_rig() {
   rig.imu->noise.accelerometer_random_walk = 1e-300;
   rig.imu->gyroscope = random_triad(random);
   rig.imu->accelerometer = random_triad(random);
+  rig.imu->noise_measured = {"gyroscope_noise_density", "accelerometer_noise_density"};
+  rig.imu->gyroscope.quality = TriadQuality{};
+  rig.imu->gyroscope.quality->method = "rest";
+  rig.imu->accelerometer.quality = full_quality(random);
   rig.magnetometer.emplace();
   rig.magnetometer->triad = random_triad(random);
   for (int i = 0; i < 2; ++i) {
@@ -47,12 +64,46 @@ Rig full_rig() {
     rig.cameras.push_back(camera);
   }
   rig.gps = GpsCalibration{{0.1, -0.2, 1.0 / 3}};
+  rig.gps->time_offset_s = -0.2;
+  rig.gps->time_offset_sigma_s = 1.0 / 3;
+  ClockCalibration clock{"imu", "host", -50.0 / 3};
+  rig.clocks.push_back(clock);
+  clock.stream = "left: \"wide\" # 2";
+  clock.reference = "gps";
+  clock.skew_sigma_ppm = 0.01 / 3;
+  clock.offset_sigma_s = 1e-6 / 3;
+  clock.jitter_rms_s = 1e-3 / 3;
+  clock.jitter_p99_s = 6e-3 / 7;
+  rig.clocks.push_back(clock);
   return rig;
+}
+
+// NaN, not known, is the same as NaN.
+template <class A, class B>
+void expect_same_or_unknown(const A& a, const B& b) {
+  const Eigen::MatrixXd x = Eigen::MatrixXd(a);
+  const Eigen::MatrixXd y = Eigen::MatrixXd(b);
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    EXPECT_TRUE(x(i) == y(i) || (std::isnan(x(i)) && std::isnan(y(i)))) << x(i) << " " << y(i);
+  }
+}
+
+void expect_same(double a, double b) {
+  EXPECT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << a << " " << b;
 }
 
 void expect_same(const TriadCalibration& a, const TriadCalibration& b) {
   EXPECT_EQ(a.bias, b.bias);
   EXPECT_EQ(a.matrix, b.matrix);
+  ASSERT_EQ(a.quality.has_value(), b.quality.has_value());
+  if (!a.quality) return;
+  EXPECT_EQ(a.quality->verdict, b.quality->verdict);
+  EXPECT_EQ(a.quality->method, b.quality->method);
+  EXPECT_EQ(a.quality->samples, b.quality->samples);
+  expect_same_or_unknown(a.quality->bias_sigma, b.quality->bias_sigma);
+  expect_same_or_unknown(a.quality->matrix_sigma, b.quality->matrix_sigma);
+  expect_same(a.quality->residual_rms, b.quality->residual_rms);
+  EXPECT_EQ(a.quality->reasons, b.quality->reasons);
 }
 
 class RigYaml : public testing::Test {
@@ -88,7 +139,22 @@ TEST_F(RigYaml, what_is_written_is_read_to_the_last_bit) {
   expect_same(back.imu->gyroscope, rig.imu->gyroscope);
   expect_same(back.imu->accelerometer, rig.imu->accelerometer);
   expect_same(back.magnetometer->triad, rig.magnetometer->triad);
+  EXPECT_EQ(back.imu->noise_measured, rig.imu->noise_measured);
   EXPECT_EQ(back.gps->antenna_in_body, rig.gps->antenna_in_body);
+  EXPECT_EQ(back.gps->time_offset_s, rig.gps->time_offset_s);
+  EXPECT_EQ(back.gps->time_offset_sigma_s, rig.gps->time_offset_sigma_s);
+  ASSERT_EQ(back.clocks.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const ClockCalibration& a = back.clocks[i];
+    const ClockCalibration& b = rig.clocks[i];
+    EXPECT_EQ(a.stream, b.stream);
+    EXPECT_EQ(a.reference, b.reference);
+    EXPECT_EQ(a.skew_ppm, b.skew_ppm);
+    expect_same(a.skew_sigma_ppm, b.skew_sigma_ppm);
+    expect_same(a.offset_sigma_s, b.offset_sigma_s);
+    expect_same(a.jitter_rms_s, b.jitter_rms_s);
+    expect_same(a.jitter_p99_s, b.jitter_p99_s);
+  }
   ASSERT_EQ(back.cameras.size(), 2U);
   for (std::size_t i = 0; i < 2; ++i) {
     const CameraCalibration& a = back.cameras[i];
@@ -128,6 +194,62 @@ TEST_F(RigYaml, the_text_of_the_header_is_read) {
                                          "...\n"));
   EXPECT_EQ(rig.magnetometer->triad.bias.x(), 1e-6);
   EXPECT_EQ(rig.gps->antenna_in_body.z(), 0.5);
+  // Files from before these keys came.
+  EXPECT_FALSE(rig.magnetometer->triad.quality);
+  EXPECT_EQ(rig.gps->time_offset_s, 0);
+  EXPECT_TRUE(std::isnan(rig.gps->time_offset_sigma_s));
+  EXPECT_TRUE(rig.clocks.empty());
+}
+
+TEST_F(RigYaml, optional_keys_are_as_strict_as_the_others) {
+  expect_error("verdict: warn", "verdict: good", {"changed.yaml:", "imu.accelerometer.quality.verdict", "'good'"});
+  expect_error("verdict: warn", "verdikt: warn", {"imu.accelerometer.quality.verdict' is missing"});
+  expect_error("bias_sigma: [", "bias_sigme: [", {"imu.accelerometer.quality.bias_sigme' is not known"});
+  expect_error("samples: 0", "samples: 1.5", {"imu.gyroscope.quality.samples", "'1.5'", "whole"});
+  expect_error("samples: 0", "samples: -5", {"imu.gyroscope.quality.samples", "-5"});
+  expect_error("reasons: []", "reasons: [[]]", {"imu.gyroscope.quality.reasons", "list of words"});
+  expect_error("reasons: []", "reasons: fine", {"imu.gyroscope.quality.reasons", "list of words"});
+  expect_error("measured: [gyro", "measured: [gyra", {"changed.yaml", "noise_measured", "gyra"});
+  expect_error("time_offset_s: -0.2", "time_offset: -0.2", {"gps.time_offset' is not known"});
+  expect_error("time_offset_s: -0.2", "time_offset_s: 1e9", {"gps.time_offset_s", "a day"});
+  expect_error("time_offset_sigma_s: ", "time_offset_sigma_s: -", {"gps.time_offset_sigma_s"});
+  expect_error("reference: \"host\"", "referense: \"host\"", {"clocks[0].reference' is missing"});
+  expect_error("stream: \"imu\"", "stream: \"imu\"\n    drift: 1", {"clocks[0].drift' is not known"});
+  expect_error("skew_ppm: -16", "skew_ppm: -16000000", {"clocks.imu.skew_ppm"});
+  expect_error("clocks:", "clocks: 1 #", {"changed.yaml"});
+}
+
+TEST_F(RigYaml, an_update_changes_its_block_and_keeps_the_rest_bit_for_bit) {
+  const Rig before = full_rig();
+  write_rig(file("rig.yaml"), before);
+  Rig expected = before;
+  expected.magnetometer->triad.bias.x() = 7;
+  expected.magnetometer->triad.quality.reset();
+  write_rig(file("expected.yaml"), expected);
+  const Rig written = update_rig(file("rig.yaml"), [](Rig& rig) {
+    rig.magnetometer->triad.bias.x() = 7;
+    rig.magnetometer->triad.quality.reset();
+  });
+  EXPECT_EQ(test::read_file(file("rig.yaml")), test::read_file(file("expected.yaml")));
+  EXPECT_EQ(written.magnetometer->triad.bias.x(), 7);
+
+  update_rig(file("new.yaml"), [](Rig& rig) { rig.gps = GpsCalibration{}; });
+  EXPECT_TRUE(read_rig(file("new.yaml")).gps);
+}
+
+TEST_F(RigYaml, an_update_that_fails_leaves_the_file_as_it_was) {
+  const std::string text = rig_text();
+  EXPECT_THROW(update_rig(file("rig.yaml"), [](Rig& rig) { rig.imu->rate_hz = -1; }), std::invalid_argument);
+  EXPECT_THROW(update_rig(file("rig.yaml"), [](Rig&) { throw std::runtime_error("no"); }), std::runtime_error);
+  EXPECT_EQ(test::read_file(file("rig.yaml")), text);
+  const auto change_nothing = [](Rig&) {};
+  const auto damaged = folder_.write("damaged.yaml", text.substr(0, text.size() / 2));
+  expect_data_error([&] { update_rig(damaged, change_nothing); }, {"damaged.yaml"});
+  EXPECT_EQ(test::read_file(damaged).size(), text.size() / 2) << "not overwritten by an empty rig";
+  std::filesystem::create_symlink("nowhere.yaml", file("link.yaml"));
+  expect_data_error([&] { update_rig(file("link.yaml"), change_nothing); }, {"link.yaml", "no such file"});
+  expect_data_error([&] { update_rig(folder_.path(), change_nothing); }, {"not a file"});
+  expect_data_error([&] { update_rig(file("absent/rig.yaml"), change_nothing); }, {"rig.yaml", "cannot be written"});
 }
 
 TEST_F(RigYaml, errors_name_file_line_and_key) {

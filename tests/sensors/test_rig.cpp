@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -22,12 +23,28 @@ CameraCalibration good_camera() {
   return camera;
 }
 
+TriadQuality good_quality() {
+  TriadQuality quality;
+  quality.method = "robust";
+  quality.samples = 500;
+  return quality;
+}
+
+ClockCalibration good_clock(const std::string& stream) {
+  ClockCalibration clock;
+  clock.stream = stream;
+  clock.skew_ppm = 50;
+  return clock;
+}
+
 Rig good_rig() {
   Rig rig;
   rig.imu = ImuCalibration{};
   rig.magnetometer = MagnetometerCalibration{};
   rig.cameras = {good_camera()};
+  rig.magnetometer->triad.quality = good_quality();
   rig.gps = GpsCalibration{};
+  rig.clocks = {good_clock("imu"), good_clock("gps")};
   return rig;
 }
 
@@ -66,6 +83,83 @@ TEST(Rig, EveryFieldIsChecked) {
   expect_refused([](Rig& r) { r.cameras[0].time_offset_s = kNan; }, "cam0.timeshift_cam_imu");
   expect_refused([](Rig& r) { r.cameras[0].rate_hz = -20; }, "cam0.rate_hz");
   expect_refused([](Rig& r) { r.gps->antenna_in_body.z() = kNan; }, "gps.antenna_in_body");
+  expect_refused([](Rig& r) { r.gps->time_offset_s = kNan; }, "gps.time_offset_s");
+  expect_refused([](Rig& r) { r.gps->time_offset_s = 1.7e9; }, "gps.time_offset_s");
+  expect_refused([](Rig& r) { r.gps->time_offset_sigma_s = -0.1; }, "gps.time_offset_sigma_s");
+  expect_refused([](Rig& r) { r.imu->noise_measured = {"gyroscope_noise"}; }, "gyroscope_noise");
+  expect_refused([](Rig& r) { r.imu->noise_measured.assign(2, "gyroscope_noise_density"); }, "twice");
+}
+
+TEST(Rig, EveryFieldOfAQualityIsChecked) {
+  const auto expect = [](auto change, const std::string& field) {
+    expect_refused([&](Rig& r) { change(*r.magnetometer->triad.quality); }, "magnetometer.quality." + field);
+  };
+  expect([](TriadQuality& q) { q.method = ""; }, "method");
+  expect([](TriadQuality& q) { q.samples = -1; }, "samples");
+  expect([](TriadQuality& q) { q.bias_sigma = {0, 1, kNan}; }, "bias_sigma");
+  expect([](TriadQuality& q) { q.bias_sigma = {0, 1, -1}; }, "bias_sigma");
+  expect([](TriadQuality& q) { q.matrix_sigma.setConstant(HUGE_VAL); }, "matrix_sigma");
+  expect([](TriadQuality& q) { q.residual_rms = -1; }, "residual_rms");
+  expect([](TriadQuality& q) { q.reasons = {"one", ""}; }, "reasons");
+  expect([](TriadQuality& q) { q.reasons = {"two\nlines"}; }, "reasons");
+}
+
+TEST(Rig, EveryFieldOfAClockIsChecked) {
+  const auto expect = [](auto change, const std::string& field) {
+    expect_refused([&](Rig& r) { change(r.clocks[0]); }, field);
+  };
+  expect([](ClockCalibration& c) { c.stream = ""; }, "clocks.stream");
+  expect([](ClockCalibration& c) { c.reference = ""; }, "clocks.reference");
+  expect([](ClockCalibration& c) { c.skew_ppm = kNan; }, "clocks.imu.skew_ppm");
+  expect([](ClockCalibration& c) { c.skew_ppm = 1e6; }, "clocks.imu.skew_ppm");
+  expect([](ClockCalibration& c) { c.skew_sigma_ppm = -1; }, "clocks.imu.skew_sigma_ppm");
+  expect([](ClockCalibration& c) { c.offset_sigma_s = -1; }, "clocks.imu.offset_sigma_s");
+  expect([](ClockCalibration& c) { c.jitter_rms_s = HUGE_VAL; }, "clocks.imu.jitter_rms_s");
+  expect([](ClockCalibration& c) { c.jitter_p99_s = -1; }, "clocks.imu.jitter_p99_s");
+  expect_refused([](Rig& r) { r.clocks[1].stream = "imu"; }, "'imu' against 'host' comes twice");
+  Rig rig = good_rig();
+  rig.clocks[1] = good_clock("imu");
+  rig.clocks[1].reference = "gps";  // against another clock: fine
+  rig.check();
+}
+
+TEST(Rig, DoubtsTellOfWarningsAndOfWhatWasForced) {
+  Rig rig = good_rig();
+  EXPECT_TRUE(doubts(rig).empty());
+  rig.magnetometer->triad.quality->verdict = Verdict::kFair;
+  EXPECT_TRUE(doubts(rig).empty());
+  rig.magnetometer->triad.quality->verdict = Verdict::kRefused;
+  rig.magnetometer->triad.quality->reasons = {"flat", "disturbed"};
+  rig.imu->gyroscope.quality = good_quality();
+  rig.imu->accelerometer.quality = good_quality();
+  rig.imu->accelerometer.quality->verdict = Verdict::kWarn;
+  rig.imu->accelerometer.quality->reasons = {"10 poses"};
+  const auto found = doubts(rig);
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(found[0].block, "imu.accelerometer");
+  EXPECT_EQ(found[0].verdict, Verdict::kWarn);
+  EXPECT_NE(found[0].text.find("warning; 10 poses"), std::string::npos) << found[0].text;
+  EXPECT_EQ(found[1].block, "magnetometer");
+  EXPECT_NE(found[1].text.find("forced); flat; disturbed"), std::string::npos) << found[1].text;
+}
+
+TEST(Rig, CalibratedMovesTheTimeOfAGpsFix) {
+  Rig rig;
+  rig.gps = GpsCalibration{};
+  rig.gps->time_offset_s = -0.2;
+  GpsMeasurement fix;
+  fix.time_ns = 1'700'000'000'123'456'789;
+  fix.host_time_ns = 7;
+  fix.gps_time_ns = 8;
+  const auto moved = std::get<GpsMeasurement>(calibrated(rig, fix));
+  EXPECT_EQ(moved.time_ns, 1'699'999'999'923'456'789);
+  EXPECT_EQ(moved.host_time_ns, 7);
+  EXPECT_EQ(moved.gps_time_ns, 8);
+  EXPECT_EQ(std::get<GpsMeasurement>(calibrated(Rig{}, fix)).time_ns, fix.time_ns);
+  for (const TimeNs odd : {kNoTime, kNoTime + 1}) {  // unknown, and where the sum would overflow
+    fix.time_ns = odd;
+    EXPECT_EQ(std::get<GpsMeasurement>(calibrated(rig, fix)).time_ns, odd);
+  }
 }
 
 TEST(Rig, ASmallUnitDoesNotMakeAMatrixSingular) {

@@ -1,5 +1,7 @@
 #include "tools/support/rig_option.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include "libloc/core/check.hpp"
 #include "libloc/io/rig_yaml.hpp"
 #include "tools/support/program.hpp"
@@ -9,7 +11,12 @@ namespace loc {
 Rig load_rig(const std::string& path) {
   if (path.empty()) return {};
   try {
-    return read_any_rig(path);
+    Rig rig = read_any_rig(path);
+    for (const RigDoubt& doubt : doubts(rig)) {
+      spdlog::warn("event=rig_quality file=\"{}\" block={} verdict={} reason=\"{}\"", path, doubt.block,
+                   verdict_name(doubt.verdict), doubt.text);
+    }
+    return rig;
   } catch (const DataError& error) {
     throw UsageError(error.what());
   } catch (const std::invalid_argument& error) {
