@@ -106,6 +106,56 @@ def test_rig_round_trip(tmp_path):
         rig.check()
 
 
+def test_rig_carries_what_calibration_says(tmp_path):
+    path = tmp_path / "rig.yaml"
+    quality = libloc.TriadQuality()
+    quality.verdict, quality.method, quality.samples = libloc.Verdict.REFUSED, "robust", 500
+    quality.bias_sigma = [1e-7, 2e-7, 3e-7]
+    quality.residual_rms = 0.004
+    quality.reasons = ["turn it more"]
+    triad = libloc.TriadCalibration()
+    triad.bias, triad.quality = [1e-5, 0, 0], quality
+
+    def set_magnetometer(rig):
+        rig.magnetometer = libloc.MagnetometerCalibration()
+        rig.magnetometer.triad = triad
+
+    def set_gps(rig):
+        rig.gps = libloc.GpsCalibration()
+        rig.gps.time_offset_s, rig.gps.time_offset_sigma_s = -0.2, 0.01
+        clock = libloc.ClockCalibration("imu", "host")
+        clock.skew_ppm = 50
+        rig.clocks = [clock]
+
+    libloc.update_rig(path, set_magnetometer)
+    written = libloc.update_rig(path, set_gps)
+    back = libloc.read_rig(path)
+    assert written.gps.time_offset_s == back.gps.time_offset_s == -0.2
+    assert [(c.stream, c.reference, c.skew_ppm) for c in back.clocks] == [("imu", "host", 50.0)]
+    assert np.isnan(back.clocks[0].jitter_rms_s)
+    got = back.magnetometer.triad.quality
+    assert (got.verdict, got.method, got.samples, got.reasons) == (3, "robust", 500, ["turn it more"])
+    assert got.bias_sigma.tolist() == [1e-7, 2e-7, 3e-7]
+    assert np.isnan(got.matrix_sigma).all()
+    ((block, verdict, text),) = back.doubts()
+    assert (block, verdict) == ("magnetometer", libloc.Verdict.REFUSED)
+    assert "turn it more" in text
+
+    before = path.read_text()
+
+    def spoil(rig):
+        rig.gps = None
+        raise RuntimeError("no")
+
+    with pytest.raises(RuntimeError, match="no"):
+        libloc.update_rig(path, spoil)
+    quality.reasons = ["two\nlines"]
+    triad.quality = quality
+    with pytest.raises(ValueError, match="one line"):
+        libloc.update_rig(path, set_magnetometer)
+    assert path.read_text() == before
+
+
 def test_imu_noise():
     noise = libloc.ImuNoise(gyroscope_noise_density=1e-3)
     assert libloc.discretise(noise, 0.01).sigma_angular_velocity == pytest.approx(1e-2)

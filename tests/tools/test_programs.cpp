@@ -411,6 +411,26 @@ TEST_F(Programs, UsageErrorsGiveExitCodeTwo) {
   }
 }
 
+TEST_F(Programs, ARigThatWasForcedIsUsedAndWarnedOf) {
+  write_recording(path("r.csv"), 200, 1);
+  std::ofstream(path("rig.yaml")) << "format: libloc-rig-1\n"
+                                     "magnetometer:\n"
+                                     "  bias: [0, 0, 0]\n"
+                                     "  matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n"
+                                     "  quality:\n"
+                                     "    verdict: refused\n"
+                                     "    method: robust\n"
+                                     "    samples: 20\n"
+                                     "    reasons: [\"it was not turned\"]\n"
+                                     "...\n";
+  const Arguments arguments = {"--config", path("rig.yaml"), "--input", path("r.csv"), "--output", path("x.csv")};
+  EXPECT_EQ(run_program("loc-estimator", arguments), 0);
+  const std::string log = errors("loc-estimator");
+  EXPECT_NE(log.find("event=rig_quality"), std::string::npos) << log;
+  EXPECT_NE(log.find("block=magnetometer verdict=refused"), std::string::npos) << log;
+  EXPECT_NE(log.find("it was not turned"), std::string::npos) << log;
+}
+
 TEST_F(Programs, RunTimeFailuresGiveExitCodeOne) {
   write_recording(path("r.csv"), 200, 1);
   EXPECT_EQ(run_program("loc-estimator", {"--lcm-url", "tcpq://127.0.0.1:1"}), 1);
