@@ -13,7 +13,7 @@ Rig load_rig(const std::string& path) {
   try {
     Rig rig = read_any_rig(path);
     for (const RigDoubt& doubt : doubts(rig)) {
-      spdlog::warn("event=rig_quality file=\"{}\" block={} verdict={} reason=\"{}\"", path, doubt.block,
+      spdlog::warn(R"(event=rig_quality file="{}" block={} verdict={} reason="{}")", path, doubt.block,
                    verdict_name(doubt.verdict), doubt.text);
     }
     return rig;
