@@ -25,6 +25,7 @@ constexpr double kFairInliers = 0.95;
 constexpr double kHighNoise = 0.05;  // of the radius: no sensor is that noisy, the field varied
 constexpr double kFairNoise = 0.03;
 constexpr double kHighAxisRatio = 2.0;
+constexpr std::int64_t kFewReadings = 30;
 constexpr Eigen::Index kLongestCorrelation = 500;  // readings
 
 std::string percent(double ratio) {
@@ -333,6 +334,9 @@ void judge(const EllipsoidOptions& options, EllipsoidFit& fit) {
     q.lower_to(noise > kHighNoise ? Verdict::kWarn : Verdict::kFair,
                "the readings scatter by " + percent(noise) + " of the radius: the field was not the same everywhere");
   }
+  if (fit.readings < kFewReadings) {
+    q.lower_to(Verdict::kWarn, std::to_string(fit.readings) + " readings check nine parameters poorly: take hundreds");
+  }
   if (fit.axis_ratio > kHighAxisRatio) {
     q.lower_to(Verdict::kWarn, "the longest axis is " + to_text(std::round(100 * fit.axis_ratio) / 100) +
                                    " times the shortest: one axis counts in another unit, or the data mislead the fit");
@@ -388,6 +392,17 @@ TriadCalibration EllipsoidFit::triad() const {
   TriadCalibration triad;
   triad.bias = centre;
   triad.matrix = matrix;
+  TriadQuality& q = triad.quality.emplace();
+  q.verdict = quality.verdict;
+  q.method = ellipsoid_method_name(method);
+  q.samples = inliers;
+  q.residual_rms = residual_rms;
+  q.reasons = quality.reasons;
+  if (cov.allFinite()) {
+    const detail::Vector9 sigma = cov.diagonal().cwiseMax(0).cwiseSqrt();
+    q.bias_sigma = sigma.head<3>();
+    q.matrix_sigma = symmetric(sigma.tail<6>());
+  }
   return triad;
 }
 

@@ -115,14 +115,15 @@ class EllipsoidCollector {
   EllipsoidFit fit() const;
   EllipsoidAdvice advice(const EllipsoidFit& fit) const;
   std::int64_t received() const { return received_; }
+  /// The readings that fit() uses, in order of arrival.
+  std::vector<Eigen::Vector3d> kept() const;
 
  private:
   std::size_t capacity() const;
-  std::vector<Eigen::Vector3d> thinned() const;
 
   EllipsoidOptions options_;
   int readings_per_cell_;
-  std::vector<Eigen::Vector3d> kept_;
+  std::vector<Eigen::Vector3d> buffer_;
   std::int64_t received_ = 0;
   std::int64_t not_finite_ = 0;
 };

@@ -35,7 +35,7 @@ EllipsoidCollector::EllipsoidCollector(EllipsoidOptions options, int readings_pe
     : options_(options), readings_per_cell_(readings_per_cell) {
   options_.check();
   require(readings_per_cell > 0, "readings_per_cell", readings_per_cell, "must be positive");
-  kept_.reserve(capacity());
+  buffer_.reserve(capacity());
 }
 
 std::size_t EllipsoidCollector::capacity() const {
@@ -48,19 +48,19 @@ bool EllipsoidCollector::add(const Eigen::Vector3d& reading) {
     ++not_finite_;
     return false;
   }
-  if (kept_.size() == capacity()) kept_ = thinned();
-  kept_.push_back(reading);
+  if (buffer_.size() == capacity()) buffer_ = kept();
+  buffer_.push_back(reading);
   return true;
 }
 
 // The latest of each cell, seen from the middle of all; in the order in which they came.
-std::vector<Eigen::Vector3d> EllipsoidCollector::thinned() const {
+std::vector<Eigen::Vector3d> EllipsoidCollector::kept() const {
   std::vector<Eigen::Vector3d> out;
   out.reserve(capacity());
-  if (kept_.empty()) return out;
-  const Eigen::Vector3d centre = middle(kept_);
+  if (buffer_.empty()) return out;
+  const Eigen::Vector3d centre = middle(buffer_);
   std::array<int, SphereCoverage::kCells> count{};
-  for (auto reading = kept_.rbegin(); reading != kept_.rend(); ++reading) {
+  for (auto reading = buffer_.rbegin(); reading != buffer_.rend(); ++reading) {
     const Eigen::Vector3d direction = *reading - centre;
     if (!(direction.norm() > 0)) continue;
     if (++count[static_cast<std::size_t>(SphereCoverage::cell(direction))] <= readings_per_cell_)
@@ -71,7 +71,7 @@ std::vector<Eigen::Vector3d> EllipsoidCollector::thinned() const {
 }
 
 EllipsoidFit EllipsoidCollector::fit() const {
-  const std::vector<Eigen::Vector3d> readings = thinned();
+  const std::vector<Eigen::Vector3d> readings = kept();
   Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> rows(static_cast<Eigen::Index>(readings.size()), 3);
   for (std::size_t i = 0; i < readings.size(); ++i) rows.row(static_cast<Eigen::Index>(i)) = readings[i].transpose();
   EllipsoidFit fit = fit_ellipsoid(rows, options_);
@@ -81,7 +81,7 @@ EllipsoidFit EllipsoidCollector::fit() const {
 
 EllipsoidAdvice EllipsoidCollector::advice(const EllipsoidFit& fit) const {
   EllipsoidAdvice advice;
-  if (kept_.empty()) {
+  if (buffer_.empty()) {
     advice.text = "No readings yet.";
     return advice;
   }
@@ -118,7 +118,7 @@ EllipsoidAdvice EllipsoidCollector::advice(const EllipsoidFit& fit) const {
     advice.text = "Every direction was seen: keep turning slowly, away from iron and currents.";
     return advice;
   }
-  const Eigen::Vector3d now = (fit.matrix * (kept_.back() - fit.centre)).normalized();
+  const Eigen::Vector3d now = (fit.matrix * (buffer_.back() - fit.centre)).normalized();
   // The field stands still and the device turns: to bring the missing direction where the field is now, it turns about
   // this axis.
   const Eigen::Vector3d axis = advice.missing_direction.cross(now);

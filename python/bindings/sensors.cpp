@@ -208,6 +208,17 @@ void bind_quality(py::module_& m) {
       .value("WARN", loc::Verdict::kWarn)
       .value("REFUSED", loc::Verdict::kRefused)
       .finalize();
+  py::class_<loc::Quality>(m, "Quality", "Verdict of a calibration on itself, and why.")
+      .def_readonly("verdict", &loc::Quality::verdict)
+      .def_property_readonly(
+          "reasons", [](const loc::Quality& self) { return self.reasons; },
+          "complete sentences; empty when all is well")
+      .def_property_readonly("usable", &loc::Quality::usable, "False when refused")
+      .def("__repr__", [](const loc::Quality& self) {
+        std::string text = std::string("Quality(") + loc::verdict_name(self.verdict);
+        for (const std::string& reason : self.reasons) text += "; " + reason;
+        return text + ")";
+      });
   py::class_<TriadQuality> quality(m, "TriadQuality",
                                    "How a triad's calibration was found, and how far it may be trusted. A deviation "
                                    "that was not estimated is NaN.");
