@@ -1,10 +1,11 @@
 """Ellipsoid fits from Python, against NumPy and SciPy."""
 
-import libloc
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
 from support import data_folder
+
+import libloc
 
 
 def simulated(seed: int, count: int = 500, offset: float = 0.6, noise: float = 0.005, radius: float = 48e-6):
