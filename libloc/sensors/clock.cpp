@@ -297,14 +297,9 @@ std::optional<ClockStamp> ClockModel::convert_once(TimeNs device_time_ns) const 
 }
 
 std::optional<ClockStamp> ClockModel::convert(TimeNs device_time_ns) {
-  std::optional<ClockStamp> stamp = convert_once(device_time_ns);
+  const std::optional<ClockStamp> stamp = convert_once(device_time_ns);
   if (!stamp) return std::nullopt;
-  const TimeNs held = monotone_.apply(device_time_ns, stamp->time_ns);
-  if (held != stamp->time_ns) {
-    stamp->sigma_ns = std::hypot(stamp->sigma_ns, static_cast<double>(held - stamp->time_ns));
-    stamp->time_ns = held;
-  }
-  return stamp;
+  return monotone_.apply(device_time_ns, *stamp);
 }
 
 }  // namespace loc

@@ -58,11 +58,6 @@ struct ClockCounts {
   std::int64_t host_steps_back = 0;
 };
 
-struct ClockStamp {
-  TimeNs time_ns = kNoTime;
-  double sigma_ns = 0;  ///< standard deviation
-};
-
 class ClockModel {
  public:
   /// @throws std::invalid_argument as ClockModelOptions::check.
@@ -81,6 +76,8 @@ class ClockModel {
   std::optional<ClockStamp> convert_once(TimeNs device_time_ns) const;
 
   bool ready() const { return bin_count_ > 0; }
+  /// The last samples, three or more in a row, do not fit the line: one of the clocks may have been set.
+  bool doubtful() const { return aside_count_ >= 3; }
   const ClockLine& line() const { return line_; }  ///< what is known now; meaningful when ready()
   /// Mean lateness of samples above the line [ns].
   double mean_jitter_ns() const { return jitter_ns_; }

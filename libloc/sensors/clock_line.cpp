@@ -73,4 +73,10 @@ TimeNs MonotoneTime::apply(TimeNs input_ns, TimeNs output_ns) {
   return output_ns;
 }
 
+ClockStamp MonotoneTime::apply(TimeNs input_ns, const ClockStamp& output) {
+  const TimeNs held = apply(input_ns, output.time_ns);
+  if (held == output.time_ns) return output;
+  return {held, std::hypot(output.sigma_ns, static_cast<double>(saturating_difference(held, output.time_ns)))};
+}
+
 }  // namespace loc

@@ -11,6 +11,12 @@ TimeNs saturating_difference(TimeNs a, TimeNs b);
 /// a + b, likewise.
 TimeNs saturating_sum(TimeNs a, TimeNs b);
 
+/// A time with its standard deviation.
+struct ClockStamp {
+  TimeNs time_ns = kNoTime;
+  double sigma_ns = 0;
+};
+
 /// output = output_ref + (input - input_ref) * (1 + skew)
 struct ClockLine {
   TimeNs input_ref_ns = 0;
@@ -41,6 +47,8 @@ class MonotoneTime {
   /// Of inputs that increase the outputs do, too (by at least 1 ns for inputs 2 ns apart); the same input as the last
   /// gives the same output again.
   TimeNs apply(TimeNs input_ns, TimeNs output_ns);
+  /// Likewise; what the time was held back or ahead by goes into sigma.
+  ClockStamp apply(TimeNs input_ns, const ClockStamp& output);
   /// The input starts anew (its counter was reset); the output goes on from where it is.
   void restart_input() { has_input_ = false; }
   /// The output's clock itself was set back: there is nothing to be held to.

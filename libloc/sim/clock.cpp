@@ -18,6 +18,13 @@ double exponential(Random& random, double mean) {
   return -mean * std::log1p(-random.uniform());
 }
 
+// Beyond the minimum [ns].
+double lateness(const DelayModel& d, double time_s, Random& random) {
+  double delay = exponential(random, static_cast<double>(d.exponential_ns));
+  if (random.uniform() < d.outlier_fraction) delay += random.uniform(0, static_cast<double>(d.outlier_max_ns));
+  return delay + static_cast<double>(d.wobble_ns) * sine(time_s, d.wobble_period_s);
+}
+
 }  // namespace
 
 ClockSimulation ClockSimulation::usb_imu() {
@@ -89,9 +96,7 @@ void ClockSimulator::advance() {
 
 ClockSample ClockSimulator::regular() {
   const DelayModel& d = simulation_.delay;
-  double delay = exponential(random_, static_cast<double>(d.exponential_ns));
-  if (random_.uniform() < d.outlier_fraction) delay += random_.uniform(0, static_cast<double>(d.outlier_max_ns));
-  delay += static_cast<double>(d.wobble_ns) * sine(to_seconds(since_start_ns_), d.wobble_period_s);
+  const double delay = lateness(d, to_seconds(since_start_ns_), random_);
   ClockSample sample;
   sample.device_time_ns = device_time_ns_;
   sample.earliest_host_ns = simulation_.host_start_ns + host_shift_ns_ + since_start_ns_ + d.minimum_ns;
@@ -148,6 +153,30 @@ std::vector<ClockSample> simulate_clock(const ClockSimulation& simulation, doubl
   samples.reserve(count);
   while (samples.size() < count) samples.push_back(simulator.next());
   return samples;
+}
+
+SimulatedGpsTime simulate_gps_time(const GpsTimeSimulation& simulation, double duration_s, Random random) {
+  Random label_random = random.fork(1);
+  SimulatedGpsTime out;
+  const TimeNs begin = simulation.pulses.device_start_ns;
+  for (const ClockSample& pulse : simulate_clock(simulation.pulses, duration_s, random.fork(2))) {
+    if (pulse.spurious) {
+      out.events.push_back({GpsTimeEvent::Kind::kPulse, pulse.host_time_ns, kNoTime});
+      continue;
+    }
+    const TimeNs gps = simulation.first_gps_time_ns + pulse.device_time_ns - begin;
+    const TimeNs host = pulse.earliest_host_ns - simulation.pulses.delay.minimum_ns;
+    out.gps_time_ns.push_back(gps);
+    out.host_time_ns.push_back(host);
+    if (simulation.with_pulses && label_random.uniform() >= simulation.pulse_loss) {
+      out.events.push_back({GpsTimeEvent::Kind::kPulse, pulse.host_time_ns, kNoTime});
+    }
+    const double late = lateness(simulation.labels, to_seconds(gps - simulation.first_gps_time_ns), label_random);
+    if (label_random.uniform() < simulation.label_loss) continue;
+    const TimeNs label = simulation.label_next ? gps + 1'000'000'000 : gps;
+    out.events.push_back({GpsTimeEvent::Kind::kLabel, host + simulation.labels.minimum_ns + std::llround(late), label});
+  }
+  return out;
 }
 
 }  // namespace loc

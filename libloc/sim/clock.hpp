@@ -11,6 +11,7 @@
 
 #include "libloc/core/random.hpp"
 #include "libloc/core/time.hpp"
+#include "libloc/sensors/gps_time_event.hpp"
 
 namespace loc {
 
@@ -94,5 +95,26 @@ class ClockSimulator {
 
 /// The samples of so long. @throws std::invalid_argument when the duration is not positive.
 std::vector<ClockSample> simulate_clock(const ClockSimulation& simulation, double duration_s, Random random);
+
+/// A receiver: pulses and labels on one host clock.
+struct GpsTimeSimulation {
+  ClockSimulation pulses = ClockSimulation::pps();
+  DelayModel labels = ClockSimulation::nmea_only().delay;  ///< after the pulse
+  bool with_pulses = true;
+  bool label_next = false;  ///< the label names the pulse that follows it
+  double pulse_loss = 0;    ///< share of pulses that are missing
+  double label_loss = 0;
+  TimeNs first_gps_time_ns = 1'400'000'000'000'000'000;  ///< of the first pulse, a whole second
+};
+
+struct SimulatedGpsTime {
+  std::vector<GpsTimeEvent> events;  ///< in the order of their arrival
+  /// Truth, second by second: GPS time, and the host's clock at that moment.
+  std::vector<TimeNs> gps_time_ns;
+  std::vector<TimeNs> host_time_ns;
+};
+
+/// @throws std::invalid_argument as ClockSimulation::check.
+SimulatedGpsTime simulate_gps_time(const GpsTimeSimulation& simulation, double duration_s, Random random);
 
 }  // namespace loc
