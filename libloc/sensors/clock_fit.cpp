@@ -20,14 +20,15 @@ double median(double* values, std::size_t count) {
   return *middle;
 }
 
-// Median over the slopes of all pairs.
+// Median over the slopes of all pairs that are not close neighbours, whose slopes are mostly noise.
 double theil_sen_slope(std::span<const EnvelopePoint> points) {
   std::array<double, kMaxPoints*(kMaxPoints - 1) / 2> slopes;
   std::size_t count = 0;
+  const double nearest = -points.front().x_s / 3;
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (std::size_t j = i + 1; j < points.size(); ++j) {
       const double dx = points[j].x_s - points[i].x_s;
-      if (dx > 0) slopes[count++] = (points[j].y_ns - points[i].y_ns) / dx;
+      if (dx > 0 && dx >= nearest) slopes[count++] = (points[j].y_ns - points[i].y_ns) / dx;
     }
   }
   return count == 0 ? 0 : median(slopes.data(), count);
