@@ -25,12 +25,12 @@ namespace loc {
 using GpsTimeEventHandler = std::function<void(const GpsTimeEvent&)>;
 
 struct NmeaFixOptions {
-  LeapSeconds leap_seconds;
+  LeapSeconds leap_seconds = LeapSeconds();
   /// A day within 10 years of the recording (live: the host's). Resolves two-digit years and brings the dates of
   /// receivers back that have outlived 1024 weeks. Without it years are 1980 to 2079 and dates are taken as told.
-  std::optional<CivilDate> reference_date;
+  std::optional<CivilDate> reference_date = std::nullopt;
   /// Used where the receiver does not tell it [m]; 0 takes its altitude as that above the ellipsoid.
-  std::optional<double> geoid_separation;
+  std::optional<double> geoid_separation = std::nullopt;
   /// Deviation of the horizontal position per unit of HDOP, and of the altitude per unit of VDOP [m]; for fixes without
   /// GST. 0: their covariance stays unknown.
   double sigma_per_dop = 0;
