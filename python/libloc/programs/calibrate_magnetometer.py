@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import libloc
-from libloc import DataError
 from libloc.programs import calibrate_plots as plots
 from libloc.programs.calibrate_input import COUNTS, Readings, Triad
 from libloc.programs.calibrate_report import Outcome, Picture, Table, with_sigma
@@ -75,16 +74,89 @@ def _tables(
     ]
 
 
-def fit_quality(fit: libloc.EllipsoidFit) -> libloc.TriadQuality:
-    """What the rig keeps of a fit."""
-    quality = libloc.TriadQuality()
-    quality.verdict = fit.quality.verdict
-    quality.method = str(fit.method)
-    quality.samples = fit.inliers
-    sigma = np.sqrt(np.diag(fit.cov))
-    if np.isfinite(sigma).all():
-        quality.bias_sigma = sigma[:3]
-        quality.matrix_sigma = matrix_sigma(fit.cov)
-    quality.residual_rms = fit.residual_rms
-    quality.reasons = list(fit.quality.reasons)
-    return quality
+def _pictures(fit: libloc.EllipsoidFit, raw: Triad, triad: libloc.TriadCalibration) -> list[Picture]:
+    corrected = (raw.rows - triad.bias) @ triad.matrix.T
+    raw_unit = display_unit(raw)
+    unit = raw_unit if raw.unit != COUNTS or fit.reference_norm > 1 else (1e6, "uT")
+    if raw.times_ns is None:
+        x, x_name = np.arange(len(raw), dtype=float), "reading"
+    else:
+        x, x_name = (raw.times_ns - raw.times_ns[0]) * 1e-9, "time [s]"
+    return [
+        Picture(
+            "spheres",
+            "Readings before and after. On the right they should lie on the sphere from all sides.",
+            partial(
+                plots.plot_spheres,
+                raw.rows,
+                corrected,
+                triad.bias,
+                triad.matrix,
+                fit.reference_norm,
+                raw_unit,
+                unit,
+            ),
+        ),
+        Picture(
+            "residuals",
+            "Length of each reading, before and after. What remains should be noise: a trend over time is a "
+            "disturbance or a change of temperature.",
+            partial(plots.plot_norms, raw.rows, corrected, fit.reference_norm, x, x_name),
+        ),
+        Picture(
+            "coverage",
+            "How often the field was seen from each direction. White: never; the calibration is a guess there.",
+            partial(plots.plot_coverage, np.asarray(fit.coverage.hits), "the field in the sensor's axes"),
+        ),
+    ]
+
+
+def calibrate(readings: Readings, options: argparse.Namespace) -> Outcome:
+    """Raises DataError when there is no magnetometer in it."""
+    raw = readings.need("magnetometer")
+    fit = libloc.fit_ellipsoid(
+        raw.rows, libloc.EllipsoidOptions(method=options.method, reference_norm=reference_norm(options))
+    )
+    scale, unit = display_unit(raw)
+    out = Outcome(
+        block="magnetometer",
+        summary=f"magnetometer: {fit.readings} readings of {readings.path}",
+        verdict=fit.quality.verdict,
+        reasons=list(fit.quality.reasons),
+        apply=None,
+        counts=readings.counts,
+    )
+    if fit.not_finite:
+        out.counts["readings.skipped.not_finite"] = fit.not_finite
+    out.facts += [
+        ("method", f"{options.method}, {fit.inliers} of {fit.readings} readings fit ({100 * fit.inliers / max(fit.readings, 1):.1f} %)"),
+    ]
+    if not fit.is_ellipsoid:
+        return out
+    out.facts += [
+        ("norm variation", f"{100 * fit.norm_variation_before:.2f} % before, {100 * fit.norm_variation_after:.2f} % after"),
+        ("residual rms", f"{100 * fit.residual_rms:.2f} % of the field over the readings that fit"),
+        ("noise of a reading", f"{scale * fit.noise_sigma:.4g} {unit}"),
+        ("centre", f"{fit.centre_over_radius:.2f} radii off zero, known to {100 * fit.centre_sigma:.2f} % of the radius"),
+        ("radius", f"{scale * fit.radius:.6g} {unit}, axes {fit.axis_ratio:.3f} : 1"),
+        ("directions seen", f"{int(np.count_nonzero(fit.coverage.hits))} of 100 cells of equal area"),
+    ]
+    triad = fit.triad()
+    if raw.unit == COUNTS and options.field_ut is None:
+        out.notes.append(
+            "The readings are counts and no --field-ut was given: corrected readings are counts, too, not tesla."
+        )
+    out.notes.append(
+        "The matrix is symmetric: by how much the magnetometer is turned against the IMU cannot be told from its norm."
+    )
+    quality = triad.quality
+    assert quality is not None
+    out.tables = _tables(fit, triad, quality, (scale, unit))
+    out.pictures = _pictures(fit, raw, triad)
+
+    def apply(rig: libloc.Rig) -> None:
+        rig.magnetometer = libloc.MagnetometerCalibration()
+        rig.magnetometer.triad = triad
+
+    out.apply = apply
+    return out
