@@ -22,7 +22,7 @@ import numpy as np
 
 import libloc
 from libloc import DataError, Verdict
-from libloc.programs import calibrate_input, calibrate_magnetometer
+from libloc.programs import calibrate_input, calibrate_live, calibrate_magnetometer
 from libloc.programs.calibrate_input import InputOptions, Readings
 from libloc.programs.calibrate_report import Outcome, text_of, write_report
 
@@ -85,7 +85,7 @@ def make_parser() -> argparse.ArgumentParser:
         "hard and soft iron, from a device that is turned about",
         calibrate_magnetometer.__doc__ or "",
     )
-    _add_input_options(magnetometer)
+    _add_input_options(magnetometer, files="*")
     calibrate_magnetometer.add_options(magnetometer)
     _add_output_options(magnetometer)
     return parser
@@ -110,6 +110,8 @@ _COMMANDS: dict[str, tuple[str, Callable[[Readings, argparse.Namespace], Outcome
 
 def read_inputs(options: argparse.Namespace) -> Readings:
     sensor = _COMMANDS[options.command][0]
+    if getattr(options, "live", False):
+        return calibrate_live.collect(options)
     first, *more = options.input
     readings = calibrate_input.read_readings(first, sensor, _input_options(options))
     for path in more:
@@ -146,6 +148,8 @@ def main(arguments: list[str] | None = None) -> int:
     command = ["loc-calibrate", *(sys.argv[1:] if arguments is None else arguments)]
     if options.out is not None and options.out.is_dir():
         parser.error(f"--out {options.out}: is a folder, not a file")
+    if options.command == "magnetometer":
+        calibrate_magnetometer.check_options(parser, options)
     try:
         if options.out is not None and options.out.exists():
             libloc.read_rig(options.out)  # before the work, not after it

@@ -50,7 +50,7 @@ class Triad:
 class Readings:
     """What one calibration takes: a sensor that is absent is None."""
 
-    path: Path
+    name: str  # of where it comes from, for messages
     form: str
     gyroscope: Triad | None = None
     accelerometer: Triad | None = None
@@ -62,13 +62,13 @@ class Readings:
         triad: Triad | None = getattr(self, name)
         if triad is None:
             there = [f"{other} ({len(t)})" for other in TRIADS if (t := getattr(self, other)) is not None]
-            raise DataError(f"{self.path}: no {name} in it; it holds {', '.join(there) or 'nothing'}")
+            raise DataError(f"{self.name}: no {name} in it; it holds {', '.join(there) or 'nothing'}")
         return triad
 
     def need_times(self, name: str) -> tuple[Triad, NDArray[np.int64]]:
         triad = self.need(name)
         if triad.times_ns is None:
-            raise DataError(f"{self.path}: no time in it: say with --rate how many readings there are a second")
+            raise DataError(f"{self.name}: no time in it: say with --rate how many readings there are a second")
         return triad, triad.times_ns
 
 
@@ -177,7 +177,7 @@ def _time_ns(text: str, unit: str) -> int:
 
 def _read_table(path: Path, columns: list[_Column], heading: bool, options: InputOptions) -> Readings:
     """Rows of numbers, one column for each of columns."""
-    out = Readings(path, "table")
+    out = Readings(str(path), "table")
     width = len(columns)
     time_at = next((i for i, c in enumerate(columns) if c.quantity == "time"), None)
     time_unit = "s"
@@ -240,7 +240,7 @@ def _read_table(path: Path, columns: list[_Column], heading: bool, options: Inpu
 
 def _of_recording(path: Path, source: libloc.MeasurementSource, form: str) -> Readings:
     recording = source.read_all()
-    out = Readings(path, form, counts={name: n for name, n in recording.counts.items() if n})
+    out = Readings(str(path), form, counts={name: n for name, n in recording.counts.items() if n})
     imu, magnetometer = recording.imu, recording.magnetometer
     for name, times, rows in (
         ("gyroscope", imu.times_ns, imu.angular_velocity),
@@ -312,7 +312,7 @@ def merged(readings: Readings, more: Readings) -> Readings:
         if getattr(more, triad) is None:
             continue
         if getattr(readings, triad) is not None:
-            raise DataError(f"{more.path}: the {triad} is in {readings.path} already")
+            raise DataError(f"{more.name}: the {triad} is in {readings.name} already")
         setattr(readings, triad, getattr(more, triad))
-    readings.counts |= {f"{more.path.name}: {name}": n for name, n in more.counts.items()}
+    readings.counts |= {f"{Path(more.name).name}: {name}": n for name, n in more.counts.items()}
     return readings

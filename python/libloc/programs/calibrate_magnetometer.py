@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import libloc
+from libloc.programs import calibrate_live
 from libloc.programs import calibrate_plots as plots
 from libloc.programs.calibrate_input import COUNTS, Readings, Triad
 from libloc.programs.calibrate_report import Outcome, Picture, Table, with_sigma
@@ -32,6 +33,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="strength of the earth's field here [uT]: corrected readings get this norm (default: they keep "
         "their own mean)",
     )
+    calibrate_live.add_options(parser)
+
+
+def check_options(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    """Ends with a usage error."""
+    if options.live == bool(options.input):
+        parser.error("magnetometer: give an INPUT, or --live")
+    for name in ("duration", "patience", "field_ut"):
+        value = getattr(options, name)
+        if value is not None and not (np.isfinite(value) and value > 0):
+            parser.error(f"--{name.replace('_', '-')} {value:g}: must be a positive number")
 
 
 def reference_norm(options: argparse.Namespace) -> float:
@@ -106,7 +118,7 @@ def _pictures(fit: libloc.EllipsoidFit, raw: Triad, triad: libloc.TriadCalibrati
         Picture(
             "coverage",
             "How often the field was seen from each direction. White: never; the calibration is a guess there.",
-            partial(plots.plot_coverage, np.asarray(fit.coverage.hits), "the field in the sensor's axes"),
+            partial(plots.plot_coverage, fit.coverage, "the field in the sensor's axes"),
         ),
     ]
 
@@ -120,7 +132,7 @@ def calibrate(readings: Readings, options: argparse.Namespace) -> Outcome:
     scale, unit = display_unit(raw)
     out = Outcome(
         block="magnetometer",
-        summary=f"magnetometer: {fit.readings} readings of {readings.path}",
+        summary=f"magnetometer: {fit.readings} readings of {readings.name}",
         verdict=fit.quality.verdict,
         reasons=list(fit.quality.reasons),
         apply=None,
@@ -139,7 +151,7 @@ def calibrate(readings: Readings, options: argparse.Namespace) -> Outcome:
         ("noise of a reading", f"{scale * fit.noise_sigma:.4g} {unit}"),
         ("centre", f"{fit.centre_over_radius:.2f} radii off zero, known to {100 * fit.centre_sigma:.2f} % of the radius"),
         ("radius", f"{scale * fit.radius:.6g} {unit}, axes {fit.axis_ratio:.3f} : 1"),
-        ("directions seen", f"{int(np.count_nonzero(fit.coverage.hits))} of 100 cells of equal area"),
+        ("directions seen", f"{fit.cells_hit} of 100 cells of equal area"),
     ]
     triad = fit.triad()
     if raw.unit == COUNTS and options.field_ut is None:

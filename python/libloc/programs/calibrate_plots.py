@@ -130,3 +130,26 @@ def plot_coverage(hits: NDArray[np.int64], what: str) -> Figure:
     bar.set_ticks(ticks.tolist(), labels=[f"{10**int(t)}" for t in ticks])
     axes.set_title(f"directions of {what}: {int(np.count_nonzero(hits))} of 100 cells of equal area")
     return figure
+
+
+def plot_progress(
+    kept: NDArray[np.float64], fit: Any, missing: NDArray[np.float64], text: str
+) -> Figure:
+    """While readings are collected: the corrected directions in space and on the map, and what to do next."""
+    figure = new_figure(12, 5)
+    axes = figure.add_subplot(1, 2, 1, projection="3d")
+    rows = (kept - fit.centre) @ fit.matrix.T / fit.reference_norm if fit.is_ellipsoid else kept
+    if fit.is_ellipsoid:
+        axes.plot_wireframe(*np.moveaxis(_sphere(), -1, 0), color=SURFACE, lw=0.4, rstride=2, cstride=2)
+    axes.scatter(*_thinned(rows).T, s=3, color=CORRECTED, depthshade=False)
+    axes.set_box_aspect((1, 1, 1))
+    axes.set(xlabel="x", ylabel="y", zlabel="z")
+    axes.set_title("readings" if not fit.is_ellipsoid else "corrected readings")
+    chart = figure.add_subplot(1, 2, 2)
+    draw_coverage(chart, fit.coverage)
+    if np.isfinite(missing).all():
+        azimuth = np.rad2deg(np.arctan2(missing[1], missing[0])) % 360
+        chart.plot(azimuth, missing[2], "*", color="tab:red", ms=18, label="point this direction of the sensor along the field")
+        chart.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18))
+    figure.suptitle(text)
+    return figure

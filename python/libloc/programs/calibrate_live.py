@@ -1,0 +1,285 @@
+"""loc-calibrate magnetometer --live: collects readings from LCM while a person turns the device, and says how to turn.
+
+It ends by itself when the centre is known well enough, after --duration, or when the source has ended; then the
+readings go the same way as those of a recording. With --report they are kept as readings.csv.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import queue
+import re
+import sys
+import threading
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TextIO
+
+import lcm
+import loc
+import numpy as np
+from numpy.typing import NDArray
+
+import libloc
+from libloc import DataError
+from libloc.programs import calibrate_plots as plots
+from libloc.programs.calibrate_input import SI, Readings, Triad
+
+DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"
+_EVALUATE_S, _PICTURE_S, _LINE_S = 0.5, 3.0, 1.0
+_CONFIRMATIONS = 2  # evaluations in a row that must say "enough"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("live")
+    group.add_argument("--live", action="store_true", help="collect from LCM instead of reading INPUT")
+    group.add_argument(
+        "--lcm-url",
+        default=os.environ.get("LCM_DEFAULT_URL") or DEFAULT_URL,
+        metavar="URL",
+        help="transport: udpm://GROUP:PORT?ttl=0 or tcpq://ADDRESS:PORT, where loc-hub runs (%(default)s)",
+    )
+    group.add_argument(
+        "--channel", default=libloc.MAGNETOMETER_CHANNEL, metavar="NAME", help="of the readings (%(default)s)"
+    )
+    group.add_argument(
+        "--imu-channel", default=libloc.IMU_CHANNEL, metavar="NAME", help="of the IMU (%(default)s)"
+    )
+    group.add_argument(
+        "--duration", type=float, default=300.0, metavar="S", help="collect no longer than this [s] (%(default)s)"
+    )
+    group.add_argument(
+        "--patience", type=float, default=10.0, metavar="S", help="give up when no reading came for this long [s] (%(default)s)"
+    )
+
+
+class Receiver:
+    """Hands messages over from a thread of its own, so that drawing loses none. Connects anew when the hub goes away."""
+
+    def __init__(self, url: str, channels: list[str]) -> None:
+        self._url, self._channels = url, channels
+        self._queue: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
+        self._stop = threading.Event()
+        self.connections_lost = 0
+        try:
+            self._lcm = self._connect()
+        except (RuntimeError, OSError) as error:
+            raise DataError(
+                f"cannot connect to {url}: {error} (tcpq needs loc-hub running there; udpm a route for multicast)"
+            ) from None
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def __enter__(self) -> Receiver:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join()
+
+    def get(self, timeout_s: float) -> tuple[str, bytes] | None:
+        try:
+            return self._queue.get(timeout=timeout_s)
+        except queue.Empty:
+            return None
+
+    def _connect(self) -> Any:
+        connection = lcm.LCM(self._url)
+        for channel in self._channels:
+            # A channel is subscribed to as a regular expression; its name is meant literally.
+            connection.subscribe(re.escape(channel), lambda name, data: self._queue.put((name, bytes(data))))
+        return connection
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            try:
+                self._lcm.handle_timeout(50)
+            except (RuntimeError, OSError):
+                self.connections_lost += 1
+                self._stop.wait(0.5)
+                try:
+                    self._lcm = self._connect()
+                except (RuntimeError, OSError):
+                    continue  # whoever waits for readings gives up when its patience ends
+
+
+@dataclass
+class _Stream:
+    times_ns: list[int] = field(default_factory=list)
+    rows: list[tuple[float, ...]] = field(default_factory=list)
+    last_sequence: int = -1
+
+
+@dataclass
+class Collection:
+    """What has come so far."""
+
+    collector: libloc.EllipsoidCollector
+    magnetometer: _Stream = field(default_factory=_Stream)
+    imu: _Stream = field(default_factory=_Stream)  # angular velocity and specific force
+    counts: Counter[str] = field(default_factory=Counter)
+    ended: str = ""  # what the source said
+
+    def take(self, channel: str, data: bytes, options: argparse.Namespace) -> bool:
+        """True for a reading of the magnetometer."""
+        try:
+            name = libloc.message_type(data)
+        except DataError:
+            name = None
+        expected = {options.channel: "magnetometer_t", options.imu_channel: "imu_t"}.get(channel, "source_status_t")
+        if name != expected:
+            self.counts[f"{channel}.refused"] += 1
+            return False
+        if name == "source_status_t":
+            status = loc.source_status_t.decode(data)
+            if status.state != loc.source_status_t.STATE_RUNNING:
+                self.ended = status.message or "the source has ended"
+            return False
+        if name == "imu_t":
+            m = loc.imu_t.decode(data)
+            self._append("imu", self.imu, m.time_ns, m.sequence, (*m.angular_velocity, *m.specific_force))
+            return False
+        m = loc.magnetometer_t.decode(data)
+        self._append("magnetometer", self.magnetometer, m.time_ns, m.sequence, tuple(m.magnetic_field))
+        self.collector.add(list(m.magnetic_field))
+        return True
+
+    def _append(self, name: str, stream: _Stream, time_ns: int, sequence: int, row: tuple[float, ...]) -> None:
+        self.counts[f"{name}.received"] += 1
+        if 0 <= stream.last_sequence < sequence - 1:
+            self.counts[f"{name}.lost"] += sequence - stream.last_sequence - 1
+        stream.last_sequence = sequence
+        stream.times_ns.append(time_ns)
+        stream.rows.append(row)
+
+    def readings(self, name: str) -> Readings:
+        out = Readings(name, "live", counts=dict(self.counts))
+        rows = np.array(self.magnetometer.rows, dtype=float).reshape(-1, 3)
+        out.magnetometer = Triad(rows, np.array(self.magnetometer.times_ns, dtype=np.int64), SI["magnetometer"])
+        if self.imu.rows:
+            both = np.array(self.imu.rows, dtype=float)
+            times = np.array(self.imu.times_ns, dtype=np.int64)
+            out.gyroscope = Triad(np.ascontiguousarray(both[:, :3]), times, SI["gyroscope"])
+            out.accelerometer = Triad(np.ascontiguousarray(both[:, 3:]), times, SI["accelerometer"])
+        return out
+
+
+def coverage_map(coverage: NDArray[np.int32], encoding: str | None) -> list[str]:
+    """The sphere of directions as ten lines of text: up is +z, to the right the azimuth from x towards y."""
+    marks = "·░▒█"
+    try:
+        marks.encode(encoding or "ascii")
+    except (UnicodeEncodeError, LookupError):
+        marks = ".-+#"
+    step = np.digitize(coverage, [1, 5, 20])
+    return ["".join(2 * marks[i] for i in row) for row in step[::-1]]
+
+
+class Progress:
+    """One line a second; on a terminal a map of the directions that is drawn over and over."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._terminal = stream.isatty()
+        self._height = 0
+        self._next = 0.0
+
+    def show(self, elapsed_s: float, received: int, fit: libloc.EllipsoidFit, advice: libloc.EllipsoidAdvice) -> None:
+        now = time.monotonic()
+        if not self._terminal and now < self._next:
+            return
+        self._next = now + _LINE_S
+        known = f"centre known to {100 * fit.centre_sigma:.2f} % of the field" if fit.is_ellipsoid else "no ellipsoid yet"
+        head = f"{elapsed_s:4.0f} s  {received} readings  {fit.cells_hit} of 100 directions  {known}"
+        if not self._terminal:
+            print(f"{head}  {advice.text}", file=self._stream, flush=True)
+            return
+        lines = [head, *(f"  {line}" for line in coverage_map(fit.coverage, self._stream.encoding)), advice.text]
+        up = f"\x1b[{self._height}A" if self._height else ""
+        self._height = len(lines)
+        print(up + "\n".join(f"\x1b[2K{line}" for line in lines), file=self._stream, flush=True)
+
+
+def write_picture(
+    folder: Path, elapsed_s: float, collection: Collection, fit: libloc.EllipsoidFit, advice: libloc.EllipsoidAdvice
+) -> None:
+    """progress.png, replaced as a whole: a viewer never sees half of it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    known = f"{100 * fit.centre_sigma:.2f} %" if fit.is_ellipsoid else "not yet"
+    text = (
+        f"{elapsed_s:.0f} s, {collection.counts['magnetometer.received']} readings, centre known to {known}\n{advice.text}"
+    )
+    figure = plots.plot_progress(collection.collector.kept, fit, advice.missing_direction, text)
+    temporary = folder / "progress.png.tmp"
+    figure.savefig(temporary, dpi=90, format="png")
+    temporary.replace(folder / "progress.png")
+
+
+def collect(options: argparse.Namespace, stream: TextIO | None = None) -> Readings:
+    """Raises DataError when nothing comes, or no connection can be made."""
+    ellipsoid = libloc.EllipsoidOptions(method="robust")
+    collection = Collection(libloc.EllipsoidCollector(ellipsoid))
+    progress = Progress(stream or sys.stderr)
+    name = f"{options.channel} on {options.lcm_url}"
+    start = last_reading = time.monotonic()
+    next_evaluation, next_picture = start + _EVALUATE_S, start + _PICTURE_S
+    enough, why = 0, "the time given with --duration is over"
+    channels = [options.channel, options.imu_channel, libloc.SOURCE_STATUS_CHANNEL]
+    with Receiver(options.lcm_url, channels) as receiver:
+        while time.monotonic() - start < options.duration:
+            message = receiver.get(0.05)
+            now = time.monotonic()
+            if message is not None and collection.take(*message, options):
+                last_reading = now
+            if now - last_reading > options.patience:
+                if not collection.magnetometer.rows:
+                    raise DataError(f"no reading on {name} within {options.patience:g} s: is loc-driver running there?")
+                why = f"no reading came for {options.patience:g} s"
+                break
+            if collection.ended and message is None:
+                why = collection.ended
+                break
+            if now < next_evaluation:
+                continue
+            next_evaluation = now + _EVALUATE_S
+            fit = collection.collector.fit()
+            advice = collection.collector.advice(fit)
+            progress.show(now - start, collection.counts["magnetometer.received"], fit, advice)
+            if options.report and now >= next_picture:
+                next_picture = now + _PICTURE_S
+                write_picture(options.report, now - start, collection, fit, advice)
+            enough = enough + 1 if advice.enough else 0
+            if enough >= _CONFIRMATIONS:
+                why = "enough directions were seen"
+                break
+    if not collection.magnetometer.rows:
+        raise DataError(f"no reading on {name}")
+    fit = collection.collector.fit()
+    if options.report:
+        write_picture(
+            options.report, time.monotonic() - start, collection, fit, collection.collector.advice(fit)
+        )
+        write_readings(options.report / "readings.csv", collection)
+    print(f"collecting ended: {why}", file=stream or sys.stderr)
+    if receiver.connections_lost:
+        collection.counts["connections.lost"] = receiver.connections_lost
+    return collection.readings(name)
+
+
+def write_readings(path: Path, collection: Collection) -> None:
+    """As a recording that libloc reads: each sensor at its own times."""
+    imu, magnetometer = collection.imu, collection.magnetometer
+    lines = [
+        (time, 0, f"{time},,,,,,,{','.join(repr(v) for v in row)}\n")
+        for time, row in zip(magnetometer.times_ns, magnetometer.rows, strict=True)
+    ] + [
+        (time, 1, f"{time},{','.join(repr(v) for v in row)},,,\n")
+        for time, row in zip(imu.times_ns, imu.rows, strict=True)
+    ]
+    lines.sort(key=lambda line: line[:2])
+    with path.open("w", encoding="ascii") as file:
+        file.write("time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2,mx_T,my_T,mz_T\n")
+        file.writelines(line for _, _, line in lines)
