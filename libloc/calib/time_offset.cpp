@@ -191,6 +191,41 @@ struct Solution {
   bool singular = false;
 };
 
+struct Row {
+  TimeNs time_ns = 0;
+  Jacobian J;
+  Residual r;  // weighted
+};
+
+// Covariance of sum(J^T r), where residuals are correlated in time: sum over pairs of J_a^T J_b times the residuals'
+// autocovariance at that distance. That is taken over the whole recording, which makes it far less noisy than sums of
+// products of the terms themselves. Tapered, so that the sum cannot become negative.
+Eigen::MatrixXd correlated_information(const std::vector<Row>& rows, double correlation_s) {
+  const Eigen::Index n = rows[0].J.cols();
+  const double span = to_seconds(rows.back().time_ns - rows[0].time_ns);
+  const double period = span / static_cast<double>(rows.size() - 1);
+  const auto lags = std::min(rows.size() / 2, static_cast<std::size_t>(correlation_s / std::max(period, 1e-9)) + 1);
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(n, n);
+  for (std::size_t lag = 0; lag < lags; ++lag) {
+    double covariance = 0;
+    Eigen::MatrixXd products = Eigen::MatrixXd::Zero(n, n);
+    std::int64_t pairs = 0;
+    for (std::size_t a = 0; a + lag < rows.size(); ++a) {
+      const Row& b = rows[a + lag];
+      if (to_seconds(b.time_ns - rows[a].time_ns) > correlation_s && lag > 0) continue;
+      covariance += rows[a].r.dot(b.r) / static_cast<double>(rows[a].r.size());
+      products += rows[a].J.transpose() * b.J;
+      ++pairs;
+    }
+    if (pairs == 0) continue;
+    const double taper = 1 - static_cast<double>(lag) / static_cast<double>(lags);
+    covariance *= taper / static_cast<double>(pairs);
+    out += lag == 0 ? Eigen::MatrixXd(covariance * products)
+                    : Eigen::MatrixXd(covariance * (products + products.transpose()));
+  }
+  return out;
+}
+
 // Gauss-Newton with Huber weights; the scale is set anew in each step.
 Solution solve(const Problem& problem, const PositionStream& stream, const TimeOffsetOptions& options) {
   const Eigen::Index n = problem.parameters();
@@ -198,18 +233,19 @@ Solution solve(const Problem& problem, const PositionStream& stream, const TimeO
   s.x = Parameters::Zero(n);
   s.x(0) = coarse_offset(problem, options.max_offset_s);
   Eigen::MatrixXd information(n, n);
-  std::vector<Parameters> scores(problem.used.size());
+  std::vector<Row> rows(problem.used.size());
   const auto linearise = [&] {
     information.setZero();
     Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
     s.scale = std::max(median(problem.norms(s.x)) * 0.85, 1e-6);  // of a norm in two dimensions: 1.18 sigma
     for (std::size_t k = 0; k < problem.used.size(); ++k) {
-      Jacobian J;
-      const Residual r = problem.residual(problem.used[k], s.x, &J);
-      const double weight = std::min(1.0, kHuber * s.scale / std::max(r.norm(), 1e-12));
-      information += weight * J.transpose() * J;
-      scores[k] = weight * J.transpose() * r;
-      right += scores[k];
+      Row& row = rows[k];
+      row.time_ns = stream.times_ns[problem.used[k]];
+      row.r = problem.residual(problem.used[k], s.x, &row.J);
+      const double weight = std::min(1.0, kHuber * s.scale / std::max(row.r.norm(), 1e-12));
+      information += weight * row.J.transpose() * row.J;
+      row.r *= weight;
+      right += row.J.transpose() * row.r;
     }
     return right;
   };
@@ -225,19 +261,8 @@ Solution solve(const Problem& problem, const PositionStream& stream, const TimeO
     s.x += step;
     s.converged = std::abs(step(0)) < 1e-6 && step.cwiseAbs().maxCoeff() < 1e-5;
   }
-  // Errors of GPS are correlated over a minute: sums of products over that lag (Newey and West 1987).
   linearise();
-  Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(n, n);
-  for (std::size_t a = 0; a < scores.size(); ++a) {
-    for (std::size_t b = a; b < scores.size(); ++b) {
-      const double lag = to_seconds(stream.times_ns[problem.used[b]] - stream.times_ns[problem.used[a]]);
-      if (lag > options.correlation_s || (a != b && options.correlation_s == 0)) break;
-      const double taper = a == b ? 1 : 1 - lag / options.correlation_s;
-      const Eigen::MatrixXd product = taper * scores[a] * scores[b].transpose();
-      meat += product;
-      if (a != b) meat += product.transpose();
-    }
-  }
+  const Eigen::MatrixXd meat = correlated_information(rows, options.correlation_s);
   const Eigen::LDLT<Eigen::MatrixXd> solver(information);
   const Eigen::MatrixXd half = solver.solve(meat);
   s.cov = solver.solve(half.transpose());

@@ -2,8 +2,8 @@
 // a reference INS, or against an estimate). Finds the offset that fits best:
 //   t_reference = t_stream + offset
 // so a receiver whose positions are older than their stamps by 0.2 s has -0.2 s. Position residuals, the reference
-// interpolated with its velocity, robust weights; sigma from residuals that are correlated over a minute, as those of
-// GPS are.
+// interpolated with its velocity, robust weights; sigma takes into account that errors of GPS
+// are correlated over a minute.
 //
 // Not observable: at constant velocity an offset and a constant error along the track are the same; while only the
 // heading changes, an antenna mounted further ahead looks the same. Speed must change. The verdict says so.
