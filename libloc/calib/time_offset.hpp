@@ -34,7 +34,7 @@ struct TimeOffsetOptions {
   bool estimate_bias = false;        ///< Also a constant difference of the positions, in world.
   bool estimate_lever_arm = false;   ///< Also a constant place of the antenna, in body. Needs rotations.
   Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();  ///< of the antenna in body, if known [m]; needs rotations
-  double correlation_s = 60;                            ///< Over which the stream's errors are correlated, for sigma.
+  double correlation_s = 120;  ///< Errors of the stream farther apart count as independent, for sigma.
 
   /// @throws std::invalid_argument naming the field and its value.
   void check() const;
