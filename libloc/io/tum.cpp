@@ -40,7 +40,7 @@ std::pair<TimeNs, Pose3> parse_pose(std::string_view line, const std::string& wh
   if (!(std::abs(q.norm() - 1) <= 1e-2)) {
     throw DataError(where + ": quaternion with norm " + to_text(q.norm()) + ": must be 1");
   }
-  return {*time_ns, Pose3(q.normalized(), {values[0], values[1], values[2]})};
+  return {*time_ns, Pose3{q.normalized(), {values[0], values[1], values[2]}}};
 }
 
 }  // namespace
