@@ -6,6 +6,13 @@ if(LOC_SANITIZE)
   set(loc_sanitize_flags -fsanitize=${LOC_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
 endif()
 
+if(LOC_FUZZ)
+  if(NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+    message(FATAL_ERROR "LOC_FUZZ needs clang with libFuzzer: -DCMAKE_CXX_COMPILER=clang++-14 (Debian: clang-14 libclang-rt-14-dev)")
+  endif()
+  list(APPEND loc_sanitize_flags -fsanitize=fuzzer-no-link,address -fno-omit-frame-pointer -g1)
+endif()
+
 # One setting for the whole program: objects built for different vector widths that exchange Eigen
 # types disagree on alignment. PUBLIC, so that a user's own files agree too.
 set(loc_arch_flags "")
