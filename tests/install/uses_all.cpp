@@ -1,8 +1,10 @@
-// A user's program with every library: makes a message, decodes it, writes and reads a rig.
+// A user's program with every library: makes a message, decodes it, fits an ellipsoid, writes and reads a rig.
 #include <cstdio>
 #include <filesystem>
 #include <vector>
 
+#include "libloc/calib/ellipsoid.hpp"
+#include "libloc/core/random.hpp"
 #include "libloc/io/rig_yaml.hpp"
 #include "loc/imu_t.hpp"
 #include "msgs/convert.hpp"
@@ -23,6 +25,12 @@ int main() {
   loc::Rig rig;
   rig.imu = loc::ImuCalibration{};
   rig.imu->gyroscope.bias = imu.angular_velocity;
+  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> readings(200, 3);
+  loc::Random random(1);
+  for (int i = 0; i < 200; ++i) readings.row(i) = Eigen::RowVector3d(1, 2, 3) + random.direction().transpose();
+  const loc::EllipsoidFit fit = loc::fit_ellipsoid(readings);
+  if ((fit.centre - Eigen::Vector3d(1, 2, 3)).norm() > 1e-6) return 4;
+  rig.magnetometer = loc::MagnetometerCalibration{.triad = fit.triad()};
   const std::filesystem::path path = std::filesystem::temp_directory_path() / "libloc_uses_all_rig.yaml";
   loc::write_rig(path, rig);
   const loc::Rig back = loc::read_rig(path);
