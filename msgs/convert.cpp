@@ -167,6 +167,19 @@ estimate_t to_message(const Estimate& e, const std::string& method, const std::s
   return out;
 }
 
+clock_t to_message(const ClockLine& line) {
+  clock_t out{};
+  out.input_ref_ns = line.input_ref_ns;
+  out.output_ref_ns = line.output_ref_ns;
+  out.skew = line.skew;
+  out.sigma_ns = line.sigma_ns;
+  out.sigma_skew = line.sigma_skew;
+  out.skew_walk = line.skew_walk;
+  out.valid_from_ns = line.valid_from_ns;
+  out.valid_to_ns = line.valid_to_ns;
+  return out;
+}
+
 ImuMeasurement from_message(const imu_t& m) {
   ImuMeasurement out;
   stamp_from(m, "imu_t", out);
@@ -295,6 +308,25 @@ Estimate from_message(const estimate_t& m) {
     }
   }
   return out;
+}
+
+ClockLine from_message(const clock_t& m) {
+  const auto reject_value = [](const char* field, double value, const char* rule) {
+    throw DataError(std::string("clock_t.") + field + " = " + to_text(value) + ": " + rule);
+  };
+  if (!(std::abs(m.skew) <= 0.1)) reject_value("skew", m.skew, "must be in [-0.1, 0.1]");
+  const auto not_negative = [&](const char* field, double value) {
+    if (!(std::isfinite(value) && value >= 0)) reject_value(field, value, "must not be negative, and finite");
+  };
+  not_negative("sigma_ns", m.sigma_ns);
+  not_negative("sigma_skew", m.sigma_skew);
+  not_negative("skew_walk", m.skew_walk);
+  if (m.valid_to_ns < m.valid_from_ns) reject("clock_t.valid_to_ns", m.valid_to_ns, "is before valid_from_ns");
+  if (m.quality < clock_t::QUALITY_LABELS || m.quality > clock_t::QUALITY_PULSES) {
+    reject("clock_t.quality", m.quality, "is not one of the qualities");
+  }
+  return {m.input_ref_ns, m.output_ref_ns, m.skew,          m.sigma_ns,
+          m.sigma_skew,   m.skew_walk,     m.valid_from_ns, m.valid_to_ns};
 }
 
 const char* default_channel(StreamKind kind) {

@@ -8,7 +8,9 @@
 #include <string>
 
 #include "libloc/estimators/estimate.hpp"
+#include "libloc/sensors/clock_line.hpp"
 #include "libloc/sensors/measurements.hpp"
+#include "loc/clock_t.hpp"
 #include "loc/estimate_t.hpp"
 #include "loc/gps_fix_t.hpp"
 #include "loc/image_t.hpp"
@@ -26,17 +28,22 @@ reference_t to_message(const ReferenceMeasurement& m);
 /// @param method, world as in estimate_t
 estimate_t to_message(const Estimate& e, const std::string& method, const std::string& world);
 
+/// The line only: who sends it, when, and how good it is, is filled in by the sender.
+clock_t to_message(const ClockLine& line);
+
 ImuMeasurement from_message(const imu_t& m);
 MagnetometerMeasurement from_message(const magnetometer_t& m);
 ImageMeasurement from_message(const image_t& m);
 GpsMeasurement from_message(const gps_fix_t& m);
 ReferenceMeasurement from_message(const reference_t& m);
 Estimate from_message(const estimate_t& m);
+ClockLine from_message(const clock_t& m);
 
 /// Channel of each stream, unless the user names another: LOC_IMU, LOC_MAGNETOMETER, LOC_IMAGE, LOC_GPS, LOC_REFERENCE.
 const char* default_channel(StreamKind kind);
 inline constexpr const char* kEstimateChannel = "LOC_ESTIMATE";
 inline constexpr const char* kStatisticsChannel = "LOC_STATISTICS";
+inline constexpr const char* kClockChannel = "LOC_CLOCK";
 inline constexpr const char* kSourceStatusChannel = "LOC_SOURCE_STATUS";
 
 }  // namespace loc

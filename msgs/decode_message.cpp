@@ -1,5 +1,6 @@
 // The one place where generated decoders of package loc are called.
 #include "libloc/core/check.hpp"
+#include "loc/clock_t.hpp"
 #include "loc/estimate_t.hpp"
 #include "loc/gps_fix_t.hpp"
 #include "loc/image_t.hpp"
@@ -19,6 +20,11 @@ namespace {
 constexpr std::int64_t kStampBytes = 3 * 8;
 
 // Only the lengths matter: one function for each type that has any, in the order of its .lcm file.
+void walk(wire::Walker& w, const clock_t&) {
+  w.skip(8);
+  for (int i = 0; i < 3; ++i) w.string();
+  w.skip(9 * 8 + 1);
+}
 void walk(wire::Walker& w, const estimate_t&) {
   w.skip(kStampBytes + 8);
   w.string();
@@ -68,6 +74,7 @@ T decode_message(std::span<const std::uint8_t> data) {
   return decode_generated<T>(data, [](wire::Walker& w, const T& empty) { walk(w, empty); });
 }
 
+template clock_t decode_message<clock_t>(std::span<const std::uint8_t>);
 template estimate_t decode_message<estimate_t>(std::span<const std::uint8_t>);
 template gps_fix_t decode_message<gps_fix_t>(std::span<const std::uint8_t>);
 template image_t decode_message<image_t>(std::span<const std::uint8_t>);

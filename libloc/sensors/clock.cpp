@@ -12,6 +12,7 @@ namespace {
 
 // Differences beyond this (146 years) are no samples.
 constexpr TimeNs kTooFar = std::numeric_limits<TimeNs>::max() / 2;
+constexpr double kLargestSkew = 0.1;             // no two clocks differ by more; keeps nonsense finite
 constexpr int kDoublings = 5;                    // of the bins' width, until the window is full
 constexpr double kSigmas = 6;                    // around the line; beyond, and beyond a step, a sample is set aside
 constexpr double kJitters = 10;                  // above the line, likewise
@@ -277,7 +278,7 @@ void ClockModel::fit() {
   const double before = lateness_ns(newest);
   line_.input_ref_ns = newest.device_ns;
   line_.output_ref_ns = saturating_sum(newest.host_ns, std::llround(envelope.value_ns));
-  line_.skew = envelope.slope * 1e-9;
+  line_.skew = std::clamp(envelope.slope * 1e-9, -kLargestSkew, kLargestSkew);
   line_.sigma_ns = envelope.sigma_value_ns;
   line_.sigma_skew = envelope.sigma_slope * 1e-9;
   line_.valid_from_ns = bin(0).lowest.device_ns - full_width_ns_;

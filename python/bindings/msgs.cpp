@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "bindings.hpp"
+#include "loc/clock_t.hpp"
 #include "loc/map_points_t.hpp"
 #include "loc/source_status_t.hpp"
 #include "loc/statistics_t.hpp"
@@ -33,11 +34,11 @@ TypeEntry entry() {
           [](std::span<const std::uint8_t> data) { static_cast<void>(loc::decode_message<T>(data)); }};
 }
 
-const std::array<TypeEntry, 10>& types() {
-  static const std::array<TypeEntry, 10> all = {
-      entry<loc::imu_t>(),        entry<loc::magnetometer_t>(), entry<loc::image_t>(),  entry<loc::gps_fix_t>(),
-      entry<loc::reference_t>(),  entry<loc::estimate_t>(),     entry<loc::tracks_t>(), entry<loc::map_points_t>(),
-      entry<loc::statistics_t>(), entry<loc::source_status_t>()};
+const std::array<TypeEntry, 11>& types() {
+  static const std::array<TypeEntry, 11> all = {
+      entry<loc::imu_t>(),        entry<loc::magnetometer_t>(),  entry<loc::image_t>(),  entry<loc::gps_fix_t>(),
+      entry<loc::reference_t>(),  entry<loc::estimate_t>(),      entry<loc::tracks_t>(), entry<loc::map_points_t>(),
+      entry<loc::statistics_t>(), entry<loc::source_status_t>(), entry<loc::clock_t>()};
   return all;
 }
 

@@ -31,6 +31,7 @@ TEST(DecodeMessage, gives_back_every_type_of_the_package) {
   check(test::map_points_message());
   check(test::statistics_message());
   check(test::source_status_message());
+  check(test::clock_message());
   check(to_message(test::gps_sample()));
   check(to_message(test::reference_sample()));
   check(to_message(test::magnetometer_sample()));
@@ -55,6 +56,7 @@ TEST(DecodeMessage, refuses_a_message_cut_at_any_byte_or_with_a_byte_too_many) {
   expect_cut_or_longer_is_refused(test::map_points_message());
   expect_cut_or_longer_is_refused(test::statistics_message());
   expect_cut_or_longer_is_refused(test::source_status_message());
+  expect_cut_or_longer_is_refused(test::clock_message());
 }
 
 // Every int32 of the message in turn becomes a length that no message has: nothing may be allocated for it, nothing
@@ -84,6 +86,7 @@ TEST(DecodeMessage, impossible_lengths_do_no_harm) {
   expect_no_harm_from_lengths(test::map_points_message());
   expect_no_harm_from_lengths(test::statistics_message());
   expect_no_harm_from_lengths(test::source_status_message());
+  expect_no_harm_from_lengths(test::clock_message());
 }
 
 TEST(DecodeMessage, a_length_that_overflows_an_int_is_refused) {

@@ -32,6 +32,7 @@ TEST(Messages, FingerprintsAreFrozen) {
   EXPECT_EQ(hash(map_points_t::getHash()), 0xcff528ac74639d5fU);
   EXPECT_EQ(hash(statistics_t::getHash()), 0x2f2b80d43dc8bfd9U);
   EXPECT_EQ(hash(source_status_t::getHash()), 0xd63ab9362bc56f14U);
+  EXPECT_EQ(hash(clock_t::getHash()), 0xf9b12a99d213a5d3U);
 }
 
 template <class T>
@@ -354,6 +355,34 @@ TEST(Messages, RefusesWhatNoSensorCanHaveSent) {
   estimate.time_ns = 1;
   estimate.covariance_dim = 16;
   expect_data_error([&] { from_message(estimate); }, "covariance_dim");
+}
+
+TEST(Messages, ClockRoundTripAndWhatIsRefused) {
+  const ClockLine line{5, -6, -2e-5, 900, 1e-8, 1.5e-8, -100, 200};
+  clock_t message = to_message(line);
+  message.quality = clock_t::QUALITY_LABELS;
+  const ClockLine back = from_message(over_the_wire(message));
+  EXPECT_EQ(back.input_ref_ns, line.input_ref_ns);
+  EXPECT_EQ(back.output_ref_ns, line.output_ref_ns);
+  EXPECT_EQ(back.skew, line.skew);
+  EXPECT_EQ(back.sigma_ns, line.sigma_ns);
+  EXPECT_EQ(back.sigma_skew, line.sigma_skew);
+  EXPECT_EQ(back.skew_walk, line.skew_walk);
+  EXPECT_EQ(back.valid_from_ns, line.valid_from_ns);
+  EXPECT_EQ(back.valid_to_ns, line.valid_to_ns);
+  const auto refused = [&](auto change) {
+    clock_t m = message;
+    change(m);
+    EXPECT_THROW(from_message(m), DataError);
+  };
+  refused([](clock_t& m) { m.skew = std::nan(""); });
+  refused([](clock_t& m) { m.skew = -1; });
+  refused([](clock_t& m) { m.sigma_ns = -1; });
+  refused([](clock_t& m) { m.sigma_skew = INFINITY; });
+  refused([](clock_t& m) { m.skew_walk = std::nan(""); });
+  refused([](clock_t& m) { m.valid_to_ns = m.valid_from_ns - 1; });
+  refused([](clock_t& m) { m.quality = 0; });
+  refused([](clock_t& m) { m.quality = 3; });
 }
 
 }  // namespace

@@ -114,6 +114,23 @@ inline statistics_t statistics_message() {
   m.value = {1, 2};
   return m;
 }
+inline clock_t clock_message() {
+  clock_t m = to_message(ClockLine{.input_ref_ns = 1'700'000'000'000'000'001,
+                                   .output_ref_ns = 1'384'000'000'000'000'002,
+                                   .skew = -2e-5,
+                                   .sigma_ns = 900,
+                                   .sigma_skew = 1e-8,
+                                   .skew_walk = 1.5e-8,
+                                   .valid_from_ns = 1'699'999'880'000'000'000,
+                                   .valid_to_ns = 1'700'000'600'000'000'000});
+  m.time_ns = 1'700'000'000'500'000'000;
+  m.source = "loc-driver 1234";
+  m.input_clock = "host";
+  m.output_clock = "gps";
+  m.epoch = 3;
+  m.quality = clock_t::QUALITY_PULSES;
+  return m;
+}
 inline source_status_t source_status_message() {
   source_status_t m{};
   m.source = "recording";
