@@ -1,10 +1,11 @@
-// loc-driver: a recording (later also sensors) onto LCM, as if it happened now.
+// loc-driver: a recording onto LCM, as if it happened now, or a GPS receiver as it happens.
 #include <spdlog/spdlog.h>
 
 #include <cmath>
 
 #include "tools/support/channels.hpp"
 #include "tools/support/driver.hpp"
+#include "tools/support/gps_options.hpp"
 #include "tools/support/open_source.hpp"
 #include "tools/support/program.hpp"
 #include "tools/support/rig_option.hpp"
@@ -38,6 +39,7 @@ void add_sources(CLI::App& app, loc::SourceSpec& spec) {
   csv->add_option("--specific-force-unit", spec.csv.specific_force_unit, "m/s^2, g, mg; likewise");
   csv->add_option("--magnetic-field-unit", spec.csv.magnetic_field_unit, "T, mT, uT, nT, gauss, mgauss, arb; likewise");
   csv->add_option("--tesla-per-unit", spec.csv.tesla_per_unit, "What one arb is");
+  loc::add_gps_sources(app, spec);
   app.require_subcommand(1);
 }
 
@@ -50,7 +52,7 @@ int main(int argc, char** argv) {
   std::string config;
   std::vector<std::string> channels;
   double wait_for_estimator = 0;
-  loc::Program program("loc-driver", "Publishes a recording on LCM, paced by its time stamps.");
+  loc::Program program("loc-driver", "Publishes a recording on LCM, paced by its time stamps, or a GPS receiver live.");
   CLI::App& app = program.app();
   options.lcm_url.clear();
   program.add_lcm_url(options.lcm_url);
@@ -79,7 +81,17 @@ int main(int argc, char** argv) {
     options.source_name = source.kind + " " + source.path;
     if (wait->count() > 0) options.wait_for_estimator_s = wait_for_estimator;
     if (!config.empty()) loc::load_rig(config);
+    options.live = source.live();
+    // The source is made first and waits in the driver's run() only.
+    loc::Driver* running = nullptr;
+    source.gps.on_idle = [&running] {
+      if (running != nullptr) running->idle();
+    };
+    source.gps.on_trouble = [&running](const std::string& text) {
+      if (running != nullptr) running->set_trouble(text);
+    };
     loc::Driver driver(options, loc::open_source(source));
+    running = &driver;
     spdlog::info("event=started source=\"{}\" speed={} url={}", options.source_name, speed, options.lcm_url);
     try {
       driver.run();

@@ -1,6 +1,8 @@
 // loc-live: driver, estimator, logger and, where there is no multicast, a hub, from one command.
 #include <spdlog/spdlog.h>
 
+#include <filesystem>
+
 #include "tools/support/live_session.hpp"
 #include "tools/support/open_source.hpp"
 #include "tools/support/program.hpp"
@@ -19,10 +21,10 @@ int main(int argc, char** argv) {
                        "Runs driver, estimator and logger as processes of their own, watches them and stops them in "
                        "order at the end of the recording or on Ctrl-C.");
   CLI::App& app = program.app();
-  app.add_option("SOURCE", kind, "euroc, lcm-log, csv, broad")
+  app.add_option("SOURCE", kind, "Recordings: euroc, lcm-log, csv, broad, nmea; live: gps-serial, gps-tcp, gpsd")
       ->required()
-      ->check(CLI::IsMember({"euroc", "lcm-log", "csv", "broad"}));
-  app.add_option("PATH", path, "The recording")->required()->check(CLI::ExistingPath);
+      ->check(CLI::IsMember({"euroc", "lcm-log", "csv", "broad", "nmea", "gps-serial", "gps-tcp", "gpsd"}));
+  app.add_option("PATH", path, "The recording; live: device, HOST:PORT")->required();
   app.add_option("--transport", transport,
                  "auto: multicast where it works, otherwise (and to log at full speed) a hub of its own; udpm; hub")
       ->check(CLI::IsMember({"auto", "udpm", "hub"}))
@@ -44,6 +46,9 @@ int main(int argc, char** argv) {
                         : transport == "udpm" ? loc::Transport::kUdpm
                                               : loc::Transport::kHub;
     options.as_fast_as_taken = speed == "max";
+    const bool live = loc::SourceSpec{.kind = kind}.live();
+    std::error_code ignored;
+    if (!live && !std::filesystem::exists(path, ignored)) throw loc::UsageError("'" + path + "' does not exist");
     if (!options.log_path.empty()) loc::refuse_to_overwrite(path, options.log_path);
     options.driver = {kind, path, "--speed", speed};
     for (std::string& argument : CLI::detail::split_up(driver_arguments)) options.driver.push_back(std::move(argument));

@@ -26,6 +26,7 @@ void DriverOptions::check() const {
   require_positive("answer-timeout", answer_timeout_s);
   require_not_negative("reconnect-timeout", reconnect_timeout_s);
   if (wait_for_estimator_s) require_positive("wait-for-estimator", *wait_for_estimator_s);
+  require(!live || (speed == 1 && start_s == 0), "--speed and --start are for recordings, not for live sources");
 }
 
 Driver::Driver(DriverOptions options, std::unique_ptr<MeasurementSource> source)
@@ -72,7 +73,7 @@ void Driver::publish_all() {
       continue;
     }
     if (duration_ns > 0 && time - *begin >= duration_ns) return;
-    if (!sleep_for(pacer_.wait_ns(time, steady_now()))) return;
+    if (!options_.live && !sleep_for(pacer_.wait_ns(time, steady_now()))) return;
     if (options_.speed == 0 && kind_of(*measurement) == StreamKind::kImu) wait_for_window();
     if (stop_requested()) return;
     publish_measurement(*measurement);
@@ -147,6 +148,11 @@ void Driver::wait_until_taken() {
 template <class Message>
 void Driver::send(const std::string& channel, const Message& message) {
   if (publisher_.publish(channel, message)) return;
+  if (options_.live) {
+    // A sensor does not wait; the estimator sees the jump of the sequence.
+    if (not_sent_++ == 0) spdlog::warn("event=connection_lost url={}", options_.lcm_url);
+    return;
+  }
   // A recording can wait: nothing is lost while the hub is away.
   spdlog::warn("event=connection_lost url={}", options_.lcm_url);
   const TimeNs give_up = steady_now() + from_seconds(options_.reconnect_timeout_s);
@@ -163,7 +169,7 @@ void Driver::publish_measurement(Measurement& measurement) {
   const auto* image = std::get_if<ImageMeasurement>(&measurement);
   Stamp& stamp = stamp_of(measurement);
   stamp.sequence = next_sequence_[{kind, image != nullptr ? image->camera : 0}]++;
-  stamp.host_time_ns = host_now();
+  if (!options_.live) stamp.host_time_ns = host_now();
   const std::string& channel = options_.channels[static_cast<std::size_t>(kind)];
   std::visit([&](const auto& m) { send(channel, to_message(m)); }, measurement);
   ++published_[static_cast<std::size_t>(kind)];
@@ -186,11 +192,20 @@ void Driver::publish_status(std::int8_t state, const std::string& text) {
   if (!publisher_.publish(kSourceStatusChannel, message)) spdlog::warn("event=status_not_sent state={}", state);
 }
 
+void Driver::idle() {
+  report_each_second();
+}
+
+void Driver::set_trouble(const std::string& text) {
+  trouble_ = text;
+  publish_status(source_status_t::STATE_RUNNING, trouble_);
+}
+
 void Driver::report_each_second() {
   const TimeNs now = steady_now();
   if (now < next_report_ns_) return;
   next_report_ns_ = now + kSecond;
-  publish_status(source_status_t::STATE_RUNNING, "");
+  publish_status(source_status_t::STATE_RUNNING, trouble_);
   if (!options_.statistics) return;
   const NamedCounts figures = counts();
   spdlog::info("event=statistics {}", format_counts(figures));
@@ -207,7 +222,9 @@ NamedCounts Driver::counts() const {
   for (NamedCount& count : source_->counts()) out.push_back(std::move(count));
   out.push_back({"left_out_before_start", left_out_});
   out.push_back({"publish.failed", publisher_.failed()});
-  if (options_.speed > 0) {
+  if (options_.live) {
+    out.push_back({"live.not_sent", not_sent_});
+  } else if (options_.speed > 0) {
     out.push_back({"pace.restarts", pacer_.restarts()});
     out.push_back({"pace.max_lag_us", pacer_.max_lag_ns() / 1000});
   } else {

@@ -1,4 +1,5 @@
-// Publishes what a source gives: paced by its time stamps, or as fast as the estimator takes it.
+// Publishes what a source gives: paced by its time stamps, or as fast as the estimator takes it; a live one as it
+// comes.
 #pragma once
 
 #include <array>
@@ -28,6 +29,7 @@ struct DriverOptions {
   double answer_timeout_s = 10;                    ///< longest silence of the estimator, when speed is 0
   double reconnect_timeout_s = 10;                 ///< longest time without a hub
   std::optional<double> wait_for_estimator_s;      ///< before the first sample
+  bool live = false;  ///< a sensor: not paced, host_time_ns is the source's, what cannot be sent is lost and counted
   bool statistics = false;
 
   /// @throws std::invalid_argument naming the field and its value.
@@ -43,6 +45,10 @@ class Driver {
   /// @throws DataError when the source cannot be read on; std::runtime_error when no estimator answers or the
   /// connection stays lost.
   void run();
+  /// What a live source calls while it waits, from its next().
+  void idle();
+  /// What is wrong with a live source, for the status; empty: nothing.
+  void set_trouble(const std::string& text);
   NamedCounts counts() const;
 
  private:
@@ -68,6 +74,8 @@ class Driver {
   std::int64_t left_out_ = 0;  // before start
   TimeNs next_report_ns_ = 0;
   TimeNs window_wait_ns_ = 0;
+  std::string trouble_;
+  std::int64_t not_sent_ = 0;  // live
 };
 
 }  // namespace loc

@@ -1,30 +1,52 @@
 #include "tools/support/open_source.hpp"
 
+#include <array>
 #include <filesystem>
+#include <fstream>
+#include <span>
 
 #include "libloc/io/broad.hpp"
 #include "libloc/io/euroc.hpp"
+#include "libloc/io/nmea_source.hpp"
 #include "msgs/lcm_log_source.hpp"
 #include "tools/support/program.hpp"
 
 namespace loc {
+namespace {
+
+bool holds_nmea(const std::string& path) {
+  std::array<char, 4096> begin{};
+  std::ifstream file(path, std::ios::binary);
+  file.read(begin.data(), begin.size());
+  NmeaReader reader;
+  std::span<const std::uint8_t> bytes(reinterpret_cast<const std::uint8_t*>(begin.data()),
+                                      static_cast<std::size_t>(file.gcount()));
+  return reader.next(bytes) != nullptr;
+}
+
+}  // namespace
 
 std::string guess_source_kind(const std::string& path) {
   if (std::filesystem::is_directory(path)) return "euroc";
   const std::string extension = std::filesystem::path(path).extension();
   if (extension == ".csv") return "csv";
   if (extension == ".mat") return "broad";
+  if (extension == ".nmea" || holds_nmea(path)) return "nmea";
   return "lcm-log";
 }
 
 std::unique_ptr<MeasurementSource> open_source(const SourceSpec& spec) {
+  if (spec.kind == "gps-serial") return open_nmea_stream(serial_connection(spec.path, spec.baud), spec.gps);
+  if (spec.kind == "gps-tcp") return open_nmea_stream(tcp_connection(spec.path), spec.gps);
+  if (spec.kind == "gpsd") return open_gpsd(spec.path, spec.gps);
   std::error_code error;
   if (!std::filesystem::exists(spec.path, error)) throw UsageError("'" + spec.path + "' does not exist");
   if (spec.kind == "euroc") return open_euroc(spec.path);
   if (spec.kind == "csv") return open_csv(spec.path, spec.csv);
   if (spec.kind == "broad") return open_broad(spec.path);
   if (spec.kind == "lcm-log") return open_lcm_log(spec.path, {.decode = spec.decode});
-  throw UsageError("source '" + spec.kind + "' is not euroc, lcm-log, csv or broad");
+  if (spec.kind == "nmea") return open_nmea(spec.path, spec.gps.fix);
+  throw UsageError("source '" + spec.kind + "' is not euroc, lcm-log, csv, broad, nmea, gps-serial, gps-tcp or gpsd");
 }
 
 void refuse_to_overwrite(const std::string& recording, const std::string& output) {

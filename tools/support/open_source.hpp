@@ -7,20 +7,28 @@
 #include "libloc/io/csv.hpp"
 #include "libloc/io/source.hpp"
 #include "msgs/decode.hpp"
+#include "tools/support/gps_source.hpp"
 
 namespace loc {
 
 struct SourceSpec {
-  std::string kind;  ///< "euroc", "lcm-log", "csv", "broad"
-  std::string path;
+  /// Of a sensor that is connected now, not of a recording.
+  bool live() const { return kind == "gps-serial" || kind == "gps-tcp" || kind == "gpsd"; }
+
+  std::string kind;      ///< "euroc", "lcm-log", "csv", "broad", "nmea"; live: "gps-serial", "gps-tcp", "gpsd"
+  std::string path;      ///< file, folder, device, HOST:PORT
   CsvOptions csv;        ///< for csv
   DecodeOptions decode;  ///< for lcm-log: channels
+  LiveGpsOptions gps;    ///< for nmea (gps.fix) and the live ones
+  int baud = 9600;       ///< for gps-serial
 };
 
-/// Kind of a recording by its looks: a folder is euroc, *.csv csv, *.mat broad, all else lcm-log.
+/// Kind of a recording by its looks: a folder is euroc, *.csv csv, *.mat broad, *.nmea nmea, another file that has NMEA
+/// sentences within its first 4 kB nmea, all else lcm-log.
 std::string guess_source_kind(const std::string& path);
 
-/// @throws UsageError for an unknown kind or a path that does not exist, DataError as the reader of that kind.
+/// @throws UsageError for an unknown kind or a path that does not exist, DataError as the reader of that kind,
+/// GpsConnectionError when a live source cannot be reached.
 std::unique_ptr<MeasurementSource> open_source(const SourceSpec& spec);
 
 /// An output must not replace the recording that is being read, by whatever name it is reached.

@@ -1,0 +1,205 @@
+#include "tools/support/gps_source.hpp"
+
+#include <spdlog/spdlog.h>
+#include <sys/poll.h>
+
+#include <array>
+#include <cerrno>
+#include <deque>
+#include <system_error>
+#include <utility>
+
+#include "libloc/core/check.hpp"
+#include "libloc/io/nmea.hpp"
+#include "tools/support/program.hpp"
+
+namespace loc {
+namespace {
+
+constexpr int kPollMs = 50;
+// The pause between two bursts, which a burst does not have: at 4800 baud a byte takes 2 ms.
+constexpr TimeNs kPause = 100'000'000;
+constexpr TimeNs kIdleStep = 100'000'000;
+
+class NmeaStreamSource final : public MeasurementSource {
+ public:
+  NmeaStreamSource(GpsConnection connection, LiveGpsOptions options)
+      : options_((options.check(), std::move(options))),
+        connection_(std::move(connection)),
+        reconnection_(options_),
+        assembler_(options_.fix, options_.on_time_event) {
+    connect();
+  }
+
+  std::optional<Measurement> next() override {
+    while (!stop_requested()) {
+      if (!waiting_.empty()) {
+        GpsMeasurement fix = waiting_.front();
+        waiting_.pop_front();
+        return fix;
+      }
+      if (!port_) {
+        if (!reconnection_.wait()) break;
+        try {
+          connect();
+        } catch (const GpsConnectionError& error) {
+          reconnection_.failed(error.what());
+        }
+        continue;
+      }
+      read_once();
+      if (options_.on_idle) options_.on_idle();
+    }
+    return std::nullopt;
+  }
+
+  NamedCounts counts() const override {
+    NamedCounts counts = {{"gps.read", sequence_}};
+    reconnection_.add_to(counts);
+    assembler_.add_to(counts);
+    reader_.counts().add_to(counts);
+    return counts;
+  }
+
+ private:
+  void connect() {
+    port_ = connection_.open();
+    last_byte_ns_ = last_sentence_ns_ = steady_now();
+    bytes_at_sentence_ = reader_.counts().bytes;
+    reconnection_.connected(connection_.name);
+  }
+
+  void read_once() {
+    pollfd event{port_.get(), POLLIN, 0};
+    const int ready = ::poll(&event, 1, kPollMs);
+    const TimeNs now = steady_now();
+    if (ready <= 0) {
+      if (now - last_byte_ns_ >= kPause) keep(assembler_.finish());
+      look_for_silence(now);
+      return;
+    }
+    std::array<std::uint8_t, 4096> buffer{};
+    const TimeNs arrival = host_now();
+    const ssize_t size = ::read(port_.get(), buffer.data(), buffer.size());
+    if (size < 0 && (errno == EAGAIN || errno == EINTR)) return;
+    if (size <= 0) {
+      disconnect(size == 0 ? "the other end has closed it" : std::generic_category().message(errno));
+      return;
+    }
+    // A pause may have gone unseen between two reads.
+    if (now - last_byte_ns_ >= kPause) keep(assembler_.finish());
+    last_byte_ns_ = now;
+    std::span<const std::uint8_t> bytes(buffer.data(), static_cast<std::size_t>(size));
+    while (const NmeaSentence* sentence = reader_.next(bytes, arrival)) {
+      last_sentence_ns_ = now;
+      bytes_at_sentence_ = reader_.counts().bytes;
+      reconnection_.trouble("");
+      keep(assembler_.process(*sentence));
+    }
+    look_for_silence(now);
+  }
+
+  void disconnect(const std::string& why) {
+    port_.close();
+    reader_.interrupt();
+    keep(assembler_.finish());
+    reconnection_.lost(connection_.name, why);
+  }
+
+  void look_for_silence(TimeNs now) {
+    const TimeNs limit = from_seconds(options_.silence_s);
+    if (now - last_byte_ns_ > limit) {
+      reconnection_.trouble(connection_.name + " is connected and silent");
+    } else if (now - last_sentence_ns_ > limit && reader_.counts().bytes - bytes_at_sentence_ > 200) {
+      reconnection_.trouble(connection_.name + " sends bytes, but no correct NMEA sentence: " + connection_.hint);
+    }
+  }
+
+  void keep(std::optional<GpsMeasurement> fix) {
+    if (!fix) return;
+    fix->time_ns = fix->host_time_ns;
+    fix->sequence = sequence_++;
+    waiting_.push_back(*fix);
+  }
+
+  LiveGpsOptions options_;
+  GpsConnection connection_;
+  Reconnection reconnection_;
+  NmeaReader reader_;
+  NmeaFixAssembler assembler_;
+  FileDescriptor port_;
+  std::deque<GpsMeasurement> waiting_;
+  TimeNs last_byte_ns_ = 0;      // steady clock
+  TimeNs last_sentence_ns_ = 0;  // steady clock
+  std::int64_t bytes_at_sentence_ = 0;
+  std::int64_t sequence_ = 0;
+};
+
+}  // namespace
+
+void LiveGpsOptions::check() const {
+  fix.check();
+  require_positive("silence", silence_s);
+  require_not_negative("reconnect", reconnect_s);
+}
+
+void Reconnection::connected(const std::string& name) {
+  ++connections_;
+  spdlog::info("event=gps_connected name=\"{}\" connections={}", name, connections_);
+  trouble("");
+}
+
+void Reconnection::lost(const std::string& name, const std::string& why) {
+  ++losses_;
+  trouble(name + ": lost: " + why);
+}
+
+void Reconnection::failed(const std::string& why) {
+  ++failures_;
+  trouble(why);
+}
+
+void Reconnection::trouble(const std::string& why) {
+  if (why == trouble_) return;
+  if (why.empty()) {
+    spdlog::info("event=gps_well");
+  } else {
+    spdlog::warn("event=gps_trouble reason=\"{}\"", why);
+  }
+  trouble_ = why;
+  if (options_.on_trouble) options_.on_trouble(why);
+}
+
+bool Reconnection::wait() const {
+  const TimeNs end = steady_now() + from_seconds(options_.reconnect_s);
+  while (steady_now() < end) {
+    if (!sleep_for(std::min(kIdleStep, end - steady_now()))) return false;
+    if (options_.on_idle) options_.on_idle();
+  }
+  return !stop_requested();
+}
+
+void Reconnection::add_to(NamedCounts& counts) const {
+  counts.push_back({"gps.connections", connections_});
+  if (losses_ > 0) counts.push_back({"gps.connections_lost", losses_});
+  if (failures_ > 0) counts.push_back({"gps.connections_failed", failures_});
+}
+
+namespace {
+
+LiveGpsOptions with_date_of_host(LiveGpsOptions options) {
+  if (options.fix.reference_date) return options;
+  // The host's clock may be wrong by years and still serve.
+  if (const auto gps = gps_from_unix(host_now(), options.fix.leap_seconds)) {
+    options.fix.reference_date = utc_from_gps(*gps, options.fix.leap_seconds).date;
+  }
+  return options;
+}
+
+}  // namespace
+
+std::unique_ptr<MeasurementSource> open_nmea_stream(GpsConnection connection, LiveGpsOptions options) {
+  return std::make_unique<NmeaStreamSource>(std::move(connection), with_date_of_host(std::move(options)));
+}
+
+}  // namespace loc

@@ -1,0 +1,63 @@
+// A receiver that is connected now: NMEA from a serial port or TCP, or what gpsd tells. When the connection is lost it
+// is made anew, as often as it takes; what happened is told and counted. time_ns of a fix is its arrival (the first
+// byte of its epoch) on the host's clock: late by what the receiver needs, 10 to 700 ms. The time of validity is
+// gps_time_ns; whoever knows the relation of the clocks puts one for the other.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "libloc/io/nmea_fix.hpp"
+#include "libloc/io/source.hpp"
+#include "tools/support/gps_connection.hpp"
+
+namespace loc {
+
+struct LiveGpsOptions {
+  /// reference_date is set to the host's date when it has none.
+  NmeaFixOptions fix;
+  double silence_s = 5;               ///< without a byte, or with bytes and no sentence, after which it is told
+  double reconnect_s = 1;             ///< between two attempts
+  GpsTimeEventHandler on_time_event;  ///< every label and pulse, from the thread that calls next()
+  std::function<void()> on_idle;      ///< at least five times a second while next() waits
+  /// When something is wrong, what; an empty text when all is well again.
+  std::function<void(const std::string&)> on_trouble;
+
+  /// @throws std::invalid_argument naming the field and its value.
+  void check() const;
+};
+
+/// @return a source whose next() waits. @throws GpsConnectionError when the first connection fails.
+std::unique_ptr<MeasurementSource> open_nmea_stream(GpsConnection connection, LiveGpsOptions options);
+
+/// gpsd, through its own library: position, velocity, errors, its leap seconds, and both kinds of its time messages:
+/// TOFF (a label) and PPS (a pulse that it has paired already).
+/// @param address HOST, HOST:PORT, or empty for the local one. @throws GpsConnectionError; UsageError when the programs
+/// were built without libgps.
+std::unique_ptr<MeasurementSource> open_gpsd(const std::string& address, LiveGpsOptions options);
+
+/// The counts of a connection, and when to try again. Internal to the sources of this file.
+class Reconnection {
+ public:
+  explicit Reconnection(const LiveGpsOptions& options) : options_(options) {}
+
+  /// The connection stands. @param name of it
+  void connected(const std::string& name);
+  void lost(const std::string& name, const std::string& why);
+  void failed(const std::string& why);
+  /// Tells why, once until it changes; empty: all is well.
+  void trouble(const std::string& why);
+  /// Sleeps in small steps until the next attempt, calling on_idle. @return false when asked to stop.
+  bool wait() const;
+  void add_to(NamedCounts& counts) const;
+
+ private:
+  const LiveGpsOptions& options_;
+  std::string trouble_;
+  std::int64_t connections_ = 0;
+  std::int64_t losses_ = 0;
+  std::int64_t failures_ = 0;
+};
+
+}  // namespace loc
