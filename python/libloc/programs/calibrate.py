@@ -1,14 +1,14 @@
 """loc-calibrate: from a recording to one block of the rig file, with a verdict and a report.
 
-INPUT is a recording (EuRoC folder, CSV with a heading, BROAD trial, LCM log) or a table of numbers: CSV without time or
-without heading (--columns), in physical units or in the sensor's counts, or a text table of imu-tk (*.mat). More
-files add the sensors that the first one does not hold.
+INPUT is a recording (EuRoC folder, CSV with a heading, BROAD trial, LCM log) or a table of numbers: CSV
+without time or without heading (--columns), in physical units or in the sensor's counts, or a text table of
+imu-tk (*.mat). More files add the sensors that the first one does not hold.
 
---out names the rig file (rig.yaml) that estimators read with --config. Its other blocks stay as they are; comments
-in it are lost. A calibration that is refused is not written, unless --force is given.
+--out names the rig file (rig.yaml) that estimators read with --config. Its other blocks stay as they are;
+comments in it are lost. A calibration that is refused is not written, unless --force is given.
 
-Exit codes: 0 done, 1 the data cannot be calibrated (the message says why), 2 wrong options, 3 refused: nothing was
-written, 130 interrupted: nothing was written.
+Exit codes: 0 done, 1 the data cannot be calibrated (the message says why), 2 wrong options, 3 refused:
+nothing was written, 130 interrupted: nothing was written.
 """
 
 from __future__ import annotations
@@ -39,9 +39,14 @@ def _positive(text: str) -> float:
 def _add_output_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("result")
     group.add_argument(
-        "--out", type=Path, metavar="RIG.yaml", help="rig file to update or create (default: nothing is written)"
+        "--out",
+        type=Path,
+        metavar="RIG.yaml",
+        help="rig file to update or create (default: nothing is written)",
     )
-    group.add_argument("--report", type=Path, metavar="DIR", help="write report.html and its pictures into this folder")
+    group.add_argument(
+        "--report", type=Path, metavar="DIR", help="write report.html and its pictures into this folder"
+    )
     group.add_argument("--force", action="store_true", help="write the result even if it is refused")
 
 
@@ -53,7 +58,9 @@ def _add_input_options(parser: argparse.ArgumentParser, files: str = "+") -> Non
         metavar="NAMES",
         help="of a table without heading, for instance t_s,ax,ay,az,mx,my,mz; a column - is passed over",
     )
-    group.add_argument("--time-unit", choices=tuple(calibrate_input.TIME_UNITS), help="where the heading has none")
+    group.add_argument(
+        "--time-unit", choices=tuple(calibrate_input.TIME_UNITS), help="where the heading has none"
+    )
     for triad in calibrate_input.TRIADS:
         group.add_argument(
             f"--{triad}-unit",
@@ -135,7 +142,9 @@ def finish(outcome: Outcome, options: argparse.Namespace, command: list[str]) ->
     else:
         libloc.update_rig(options.out, outcome.apply)
         forced = " although it was refused (--force)" if outcome.verdict == Verdict.REFUSED else ""
-        written = f"Block {outcome.block} was written to {options.out}{forced}; its other blocks stay as they were."
+        written = (
+            f"Block {outcome.block} was written to {options.out}{forced}; its other blocks stay as they were."
+        )
     print(written)
     if options.report:
         print(f"Report: {write_report(options.report, outcome, command, written)}")

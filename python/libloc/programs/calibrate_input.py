@@ -1,8 +1,8 @@
 """What loc-calibrate reads: the triads of one or more recordings, in SI units or in the sensor's own counts.
 
-Recordings of libloc (EuRoC folder, CSV with a heading, BROAD trial, LCM log) are read by libloc itself. This file
-adds the text files that are no recordings: without time, with half an IMU, without a heading, in counts, and the
-tables of imu-tk (*.mat as text: time in seconds and three readings a line).
+Recordings of libloc (EuRoC folder, CSV with a heading, BROAD trial, LCM log) are read by libloc itself. This
+file adds the text files that are no recordings: without time, with half an IMU, without a heading, in counts,
+and the tables of imu-tk (*.mat as text: time in seconds and three readings a line).
 """
 
 from __future__ import annotations
@@ -25,7 +25,13 @@ COUNTS = "counts"
 TRIADS = ("gyroscope", "accelerometer", "magnetometer")
 SI = {"gyroscope": "rad/s", "accelerometer": "m/s²", "magnetometer": "T"}
 UNITS: dict[str, dict[str, float]] = {
-    "gyroscope": {"rad/s": 1.0, "rad_s": 1.0, "deg/s": math.pi / 180, "deg_s": math.pi / 180, "dps": math.pi / 180},
+    "gyroscope": {
+        "rad/s": 1.0,
+        "rad_s": 1.0,
+        "deg/s": math.pi / 180,
+        "deg_s": math.pi / 180,
+        "dps": math.pi / 180,
+    },
     "accelerometer": {"m/s^2": 1.0, "m/s2": 1.0, "m_s2": 1.0, "g": GRAVITY, "mg": GRAVITY * 1e-3},
     "magnetometer": {"T": 1.0, "mT": 1e-3, "uT": 1e-6, "nT": 1e-9, "gauss": 1e-4, "mgauss": 1e-7},
 }
@@ -68,7 +74,9 @@ class Readings:
     def need_times(self, name: str) -> tuple[Triad, NDArray[np.int64]]:
         triad = self.need(name)
         if triad.times_ns is None:
-            raise DataError(f"{self.name}: no time in it: say with --rate how many readings there are a second")
+            raise DataError(
+                f"{self.name}: no time in it: say with --rate how many readings there are a second"
+            )
         return triad, triad.times_ns
 
 
@@ -120,16 +128,21 @@ def _find_unit(quantity: str, written: str | None, options: InputOptions, what: 
     given = options.unit(quantity)
     if written is not None and written not in (COUNTS, "arb", "raw"):
         if given is not None:
-            raise DataError(f"{what}: its unit is written already; --{quantity}-unit {given} contradicts that")
+            raise DataError(
+                f"{what}: its unit is written already; --{quantity}-unit {given} contradicts that"
+            )
         for known in UNITS[quantity]:
             if written.lower() == known.lower():
                 return known
-        raise DataError(f"{what}: unit '{written}' is not known; known are {', '.join(UNITS[quantity])}, {COUNTS}")
+        raise DataError(
+            f"{what}: unit '{written}' is not known; known are {', '.join(UNITS[quantity])}, {COUNTS}"
+        )
     if written is not None and given in (None, COUNTS):
         return COUNTS
     if given is None:
         raise DataError(
-            f"{what}: no unit: give --{quantity}-unit, one of {', '.join(UNITS[quantity])}, {COUNTS} (the sensor's own)"
+            f"{what}: no unit: give --{quantity}-unit, one of {', '.join(UNITS[quantity])}, {COUNTS} (the "
+            "sensor's own)"
         )
     return given
 
@@ -139,10 +152,13 @@ def _check_columns(columns: Sequence[_Column | None], texts: Sequence[str], wher
     for column, text in zip(columns, texts, strict=True):
         if column is None:
             raise DataError(
-                f"{where}: column '{text.strip()}' is not known; known are t, gx gy gz, ax ay az, mx my mz, and - for "
+                f"{where}: column '{text.strip()}' is not known; known are t, gx gy gz, ax ay az, mx my mz, "
+                "and - for "
                 "a column to pass over"
             )
-        if column.quantity != "-" and any((c.quantity, c.axis) == (column.quantity, column.axis) for c in out):
+        if column.quantity != "-" and any(
+            (c.quantity, c.axis) == (column.quantity, column.axis) for c in out
+        ):
             raise DataError(f"{where}: column '{text.strip()}' comes twice")
         out.append(column)
     for triad in TRIADS:
@@ -185,10 +201,16 @@ def _read_table(path: Path, columns: list[_Column], heading: bool, options: Inpu
         written = columns[time_at].unit
         time_unit = written or options.time_unit or ""
         if time_unit not in TIME_UNITS:
-            raise DataError(f"{path}: the time has the unit '{time_unit}': give --time-unit, one of {', '.join(TIME_UNITS)}")
+            raise DataError(
+                f"{path}: the time has the unit '{time_unit}': give --time-unit, one of "
+                f"{', '.join(TIME_UNITS)}"
+            )
     places: dict[str, list[int]] = {}
     for triad in TRIADS:
-        at = [next((i for i, c in enumerate(columns) if (c.quantity, c.axis) == (triad, axis)), -1) for axis in range(3)]
+        at = [
+            next((i for i, c in enumerate(columns) if (c.quantity, c.axis) == (triad, axis)), -1)
+            for axis in range(3)
+        ]
         if at[0] >= 0:
             places[triad] = at
     values: dict[str, list[list[float]]] = {triad: [] for triad in places}
@@ -210,7 +232,9 @@ def _read_table(path: Path, columns: list[_Column], heading: bool, options: Inpu
                 try:
                     time = _time_ns(cells[time_at], time_unit)
                 except (InvalidOperation, ValueError, OverflowError):
-                    raise DataError(f"{path}:{number}: '{cells[time_at]}' is no time in {time_unit}") from None
+                    raise DataError(
+                        f"{path}:{number}: '{cells[time_at]}' is no time in {time_unit}"
+                    ) from None
             for triad, at in places.items():
                 texts = [cells[i] for i in at]
                 if not any(texts):
@@ -218,7 +242,9 @@ def _read_table(path: Path, columns: list[_Column], heading: bool, options: Inpu
                 try:
                     values[triad].append([float(cell) for cell in texts])
                 except ValueError:
-                    raise DataError(f"{path}:{number}: {triad}: '{', '.join(texts)}' are not three numbers") from None
+                    raise DataError(
+                        f"{path}:{number}: {triad}: '{', '.join(texts)}' are not three numbers"
+                    ) from None
                 times[triad].append(time)
     for triad, at in places.items():
         if not values[triad]:
@@ -231,7 +257,9 @@ def _read_table(path: Path, columns: list[_Column], heading: bool, options: Inpu
         elif options.rate_hz is not None:
             stamps = np.rint(np.arange(len(rows)) * (1e9 / options.rate_hz)).astype(np.int64)
         scaled = rows if unit == COUNTS else rows * UNITS[triad][unit]
-        setattr(out, triad, Triad(np.ascontiguousarray(scaled), stamps, COUNTS if unit == COUNTS else SI[triad]))
+        setattr(
+            out, triad, Triad(np.ascontiguousarray(scaled), stamps, COUNTS if unit == COUNTS else SI[triad])
+        )
         out.counts[f"{triad}.read"] = len(rows)
     if not any(getattr(out, triad) is not None for triad in TRIADS):
         raise DataError(f"{path}: no readings in it")
@@ -253,13 +281,14 @@ def _of_recording(path: Path, source: libloc.MeasurementSource, form: str) -> Re
     return out
 
 
-def _csv_units(options: InputOptions) -> dict[str, str]:
-    """What open_csv takes for headings without units."""
-    names = {"gyroscope": "angular_velocity_unit", "accelerometer": "specific_force_unit", "magnetometer": "magnetic_field_unit"}
-    out = {names[triad]: unit for triad in TRIADS if (unit := options.unit(triad)) is not None}
-    if options.time_unit is not None:
-        out["time_unit"] = options.time_unit
-    return out
+def _open_csv(path: Path, options: InputOptions) -> libloc.MeasurementSource:
+    return libloc.open_csv(
+        path,
+        time_unit=options.time_unit or "",
+        angular_velocity_unit=options.gyroscope_unit or "",
+        specific_force_unit=options.accelerometer_unit or "",
+        magnetic_field_unit=options.magnetometer_unit or "",
+    )
 
 
 def _read_text(path: Path, sensor: str, options: InputOptions) -> Readings:
@@ -281,8 +310,8 @@ def _read_text(path: Path, sensor: str, options: InputOptions) -> Readings:
             columns = [_Column("time", 0, "s"), *(_Column(sensor, axis, None) for axis in range(3))]
             return _read_table(path, columns, False, options)
         raise DataError(
-            f"{path}: the first line is numbers, not a heading: name its {len(cells)} columns, for instance --columns "
-            + ",".join(f"{sensor[0]}{axis}" for axis in "xyz")
+            f"{path}: the first line is numbers, not a heading: name its {len(cells)} columns, for instance "
+            "--columns " + ",".join(f"{sensor[0]}{axis}" for axis in "xyz")
         )
     known = [_column(cell) for cell in cells]
     quantities = {column.quantity for column in known if column is not None}
@@ -290,7 +319,7 @@ def _read_text(path: Path, sensor: str, options: InputOptions) -> Readings:
     half = ("gyroscope" in quantities) != ("accelerometer" in quantities)
     if None not in known and (counts or half or "time" not in quantities):
         return _read_table(path, _check_columns(known, cells, f"{path}:1"), True, options)
-    return _of_recording(path, libloc.open_csv(path, **_csv_units(options)), "csv")
+    return _of_recording(path, _open_csv(path, options), "csv")
 
 
 def read_readings(path: Path, sensor: str, options: InputOptions) -> Readings:

@@ -1,7 +1,8 @@
-"""loc-calibrate magnetometer --live: collects readings from LCM while a person turns the device, and says how to turn.
+"""loc-calibrate magnetometer --live: collects readings from LCM while a person turns the device.
 
-It ends by itself when the centre is known well enough, after --duration, or when the source has ended; then the
-readings go the same way as those of a recording. With --report they are kept as readings.csv.
+It says how to turn, and ends by itself when the centre is known well enough, after --duration, or when the
+source has ended; then the readings go the same way as those of a recording. With --report they are kept as
+readings.csv.
 """
 
 from __future__ import annotations
@@ -49,15 +50,26 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--imu-channel", default=libloc.IMU_CHANNEL, metavar="NAME", help="of the IMU (%(default)s)"
     )
     group.add_argument(
-        "--duration", type=float, default=300.0, metavar="S", help="collect no longer than this [s] (%(default)s)"
+        "--duration",
+        type=float,
+        default=300.0,
+        metavar="S",
+        help="collect no longer than this [s] (%(default)s)",
     )
     group.add_argument(
-        "--patience", type=float, default=10.0, metavar="S", help="give up when no reading came for this long [s] (%(default)s)"
+        "--patience",
+        type=float,
+        default=10.0,
+        metavar="S",
+        help="give up when no reading came for this long [s] (%(default)s)",
     )
 
 
 class Receiver:
-    """Hands messages over from a thread of its own, so that drawing loses none. Connects anew when the hub goes away."""
+    """Hands messages over from a thread of its own, so that drawing loses none.
+
+    Connects anew when the hub goes away.
+    """
 
     def __init__(self, url: str, channels: list[str]) -> None:
         self._url, self._channels = url, channels
@@ -68,7 +80,8 @@ class Receiver:
             self._lcm = self._connect()
         except (RuntimeError, OSError) as error:
             raise DataError(
-                f"cannot connect to {url}: {error} (tcpq needs loc-hub running there; udpm a route for multicast)"
+                f"cannot connect to {url}: {error} (tcpq needs loc-hub running there; udpm a route for "
+                "multicast)"
             ) from None
         self._thread = threading.Thread(target=self._run, daemon=True)
 
@@ -129,7 +142,9 @@ class Collection:
             name = libloc.message_type(data)
         except DataError:
             name = None
-        expected = {options.channel: "magnetometer_t", options.imu_channel: "imu_t"}.get(channel, "source_status_t")
+        expected = {options.channel: "magnetometer_t", options.imu_channel: "imu_t"}.get(
+            channel, "source_status_t"
+        )
         if name != expected:
             self.counts[f"{channel}.refused"] += 1
             return False
@@ -147,7 +162,9 @@ class Collection:
         self.collector.add(list(m.magnetic_field))
         return True
 
-    def _append(self, name: str, stream: _Stream, time_ns: int, sequence: int, row: tuple[float, ...]) -> None:
+    def _append(
+        self, name: str, stream: _Stream, time_ns: int, sequence: int, row: tuple[float, ...]
+    ) -> None:
         self.counts[f"{name}.received"] += 1
         if 0 <= stream.last_sequence < sequence - 1:
             self.counts[f"{name}.lost"] += sequence - stream.last_sequence - 1
@@ -158,7 +175,9 @@ class Collection:
     def readings(self, name: str) -> Readings:
         out = Readings(name, "live", counts=dict(self.counts))
         rows = np.array(self.magnetometer.rows, dtype=float).reshape(-1, 3)
-        out.magnetometer = Triad(rows, np.array(self.magnetometer.times_ns, dtype=np.int64), SI["magnetometer"])
+        out.magnetometer = Triad(
+            rows, np.array(self.magnetometer.times_ns, dtype=np.int64), SI["magnetometer"]
+        )
         if self.imu.rows:
             both = np.array(self.imu.rows, dtype=float)
             times = np.array(self.imu.times_ns, dtype=np.int64)
@@ -187,31 +206,44 @@ class Progress:
         self._height = 0
         self._next = 0.0
 
-    def show(self, elapsed_s: float, received: int, fit: libloc.EllipsoidFit, advice: libloc.EllipsoidAdvice) -> None:
+    def show(
+        self, elapsed_s: float, received: int, fit: libloc.EllipsoidFit, advice: libloc.EllipsoidAdvice
+    ) -> None:
         now = time.monotonic()
         if not self._terminal and now < self._next:
             return
         self._next = now + _LINE_S
-        known = f"centre known to {100 * fit.centre_sigma:.2f} % of the field" if fit.is_ellipsoid else "no ellipsoid yet"
+        known = (
+            f"centre known to {100 * fit.centre_sigma:.2f} % of the field"
+            if fit.is_ellipsoid
+            else "no ellipsoid yet"
+        )
         head = f"{elapsed_s:4.0f} s  {received} readings  {fit.cells_hit} of 100 directions  {known}"
         if not self._terminal:
             print(f"{head}  {advice.text}", file=self._stream, flush=True)
             return
-        lines = [head, *(f"  {line}" for line in coverage_map(fit.coverage, self._stream.encoding)), advice.text]
+        lines = [
+            head,
+            *(f"  {line}" for line in coverage_map(fit.coverage, self._stream.encoding)),
+            advice.text,
+        ]
         up = f"\x1b[{self._height}A" if self._height else ""
         self._height = len(lines)
         print(up + "\n".join(f"\x1b[2K{line}" for line in lines), file=self._stream, flush=True)
 
 
 def write_picture(
-    folder: Path, elapsed_s: float, collection: Collection, fit: libloc.EllipsoidFit, advice: libloc.EllipsoidAdvice
+    folder: Path,
+    elapsed_s: float,
+    collection: Collection,
+    fit: libloc.EllipsoidFit,
+    advice: libloc.EllipsoidAdvice,
 ) -> None:
     """progress.png, replaced as a whole: a viewer never sees half of it."""
     folder.mkdir(parents=True, exist_ok=True)
     known = f"{100 * fit.centre_sigma:.2f} %" if fit.is_ellipsoid else "not yet"
-    text = (
-        f"{elapsed_s:.0f} s, {collection.counts['magnetometer.received']} readings, centre known to {known}\n{advice.text}"
-    )
+    received = collection.counts["magnetometer.received"]
+    text = f"{elapsed_s:.0f} s, {received} readings, centre known to {known}\n{advice.text}"
     figure = plots.plot_progress(collection.collector.kept, fit, advice.missing_direction, text)
     temporary = folder / "progress.png.tmp"
     figure.savefig(temporary, dpi=90, format="png")
@@ -236,7 +268,9 @@ def collect(options: argparse.Namespace, stream: TextIO | None = None) -> Readin
                 last_reading = now
             if now - last_reading > options.patience:
                 if not collection.magnetometer.rows:
-                    raise DataError(f"no reading on {name} within {options.patience:g} s: is loc-driver running there?")
+                    raise DataError(
+                        f"no reading on {name} within {options.patience:g} s: is loc-driver running there?"
+                    )
                 why = f"no reading came for {options.patience:g} s"
                 break
             if collection.ended and message is None:

@@ -23,8 +23,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--method",
         choices=("robust", "als", "lsq", "sphere"),
         default="robust",
-        help="robust: for real data; als: clean data over a part of the sphere; lsq: the plain nine-parameter fit; "
-        "sphere: bias only (%(default)s)",
+        help="robust: for real data; als: clean data over a part of the sphere; lsq: the plain "
+        "nine-parameter fit; sphere: bias only (%(default)s)",
     )
     parser.add_argument(
         "--field-ut",
@@ -51,7 +51,9 @@ def reference_norm(options: argparse.Namespace) -> float:
     return 0.0 if options.field_ut is None else options.field_ut * 1e-6
 
 
-def matrix_sigma(cov: NDArray[np.float64], rotation: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+def matrix_sigma(
+    cov: NDArray[np.float64], rotation: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
     """Deviations of the entries of W, or of rotation @ W: (3, 3)."""
     jacobian = np.zeros((9, 6))
     for k, (i, j) in enumerate(_ENTRIES):
@@ -59,7 +61,8 @@ def matrix_sigma(cov: NDArray[np.float64], rotation: NDArray[np.float64] | None 
         entry[i, j] = entry[j, i] = 1
         jacobian[:, k] = (entry if rotation is None else rotation @ entry).ravel()
     variance = np.einsum("ij,jk,ik->i", jacobian, cov[3:, 3:], jacobian)
-    return np.sqrt(np.maximum(variance, 0)).reshape(3, 3)
+    sigma: NDArray[np.float64] = np.sqrt(np.maximum(variance, 0)).reshape(3, 3)
+    return sigma
 
 
 def display_unit(triad: Triad) -> tuple[float, str]:
@@ -68,7 +71,10 @@ def display_unit(triad: Triad) -> tuple[float, str]:
 
 
 def _tables(
-    fit: libloc.EllipsoidFit, triad: libloc.TriadCalibration, quality: libloc.TriadQuality, unit: tuple[float, str]
+    fit: libloc.EllipsoidFit,
+    triad: libloc.TriadCalibration,
+    quality: libloc.TriadQuality,
+    unit: tuple[float, str],
 ) -> list[Table]:
     scale, name = unit
     axes = ["x", "y", "z"]
@@ -117,7 +123,8 @@ def _pictures(fit: libloc.EllipsoidFit, raw: Triad, triad: libloc.TriadCalibrati
         ),
         Picture(
             "coverage",
-            "How often the field was seen from each direction. White: never; the calibration is a guess there.",
+            "How often the field was seen from each direction. White: never; the calibration is a guess "
+            "there.",
             partial(plots.plot_coverage, fit.coverage, "the field in the sensor's axes"),
         ),
     ]
@@ -140,26 +147,39 @@ def calibrate(readings: Readings, options: argparse.Namespace) -> Outcome:
     )
     if fit.not_finite:
         out.counts["readings.skipped.not_finite"] = fit.not_finite
+    share = 100 * fit.inliers / max(fit.readings, 1)
     out.facts += [
-        ("method", f"{options.method}, {fit.inliers} of {fit.readings} readings fit ({100 * fit.inliers / max(fit.readings, 1):.1f} %)"),
+        (
+            "method",
+            f"{options.method}, {fit.inliers} of {fit.readings} readings fit ({share:.1f} %)",
+        ),
     ]
     if not fit.is_ellipsoid:
         return out
     out.facts += [
-        ("norm variation", f"{100 * fit.norm_variation_before:.2f} % before, {100 * fit.norm_variation_after:.2f} % after"),
+        (
+            "norm variation",
+            f"{100 * fit.norm_variation_before:.2f} % before, {100 * fit.norm_variation_after:.2f} % after",
+        ),
         ("residual rms", f"{100 * fit.residual_rms:.2f} % of the field over the readings that fit"),
         ("noise of a reading", f"{scale * fit.noise_sigma:.4g} {unit}"),
-        ("centre", f"{fit.centre_over_radius:.2f} radii off zero, known to {100 * fit.centre_sigma:.2f} % of the radius"),
+        (
+            "centre",
+            f"{fit.centre_over_radius:.2f} radii off zero, known to {100 * fit.centre_sigma:.2f} % of the "
+            "radius",
+        ),
         ("radius", f"{scale * fit.radius:.6g} {unit}, axes {fit.axis_ratio:.3f} : 1"),
         ("directions seen", f"{fit.cells_hit} of 100 cells of equal area"),
     ]
     triad = fit.triad()
     if raw.unit == COUNTS and options.field_ut is None:
         out.notes.append(
-            "The readings are counts and no --field-ut was given: corrected readings are counts, too, not tesla."
+            "The readings are counts and no --field-ut was given: corrected readings are counts, too, not "
+            "tesla."
         )
     out.notes.append(
-        "The matrix is symmetric: by how much the magnetometer is turned against the IMU cannot be told from its norm."
+        "The matrix is symmetric: by how much the magnetometer is turned against the IMU cannot be told from "
+        "its norm."
     )
     quality = triad.quality
     assert quality is not None

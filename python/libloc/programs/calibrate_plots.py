@@ -1,4 +1,4 @@
-"""Pictures of loc-calibrate magnetometer (and of the sphere that an accelerometer's poses lie on); no screen needed."""
+"""Pictures of loc-calibrate magnetometer; drawn without a screen."""
 
 from __future__ import annotations
 
@@ -55,7 +55,10 @@ def plot_spheres(
     raw_unit: tuple[float, str],
     unit: tuple[float, str],
 ) -> Figure:
-    """Readings on the ellipsoid that was fitted, and corrected on the sphere. *_unit: (factor, name) for the axes."""
+    """Readings on the ellipsoid that was fitted, and corrected on the sphere.
+
+    *_unit: (factor, name) for the axes.
+    """
     figure = new_figure(12, 6)
     sphere = norm * _sphere()
     ellipsoid = centre + np.linalg.solve(matrix, sphere.reshape(-1, 3).T).T.reshape(sphere.shape)
@@ -81,7 +84,10 @@ def plot_norms(
     before = 100 * (before / np.nanmean(before) - 1)
     after = 100 * (after / norm - 1)
     for row, (values, colour, title) in enumerate(
-        ((before, RAW, "before: |reading|, off its mean [%]"), (after, CORRECTED, "after: |corrected|, off the reference [%]"))
+        (
+            (before, RAW, "before: |reading|, off its mean [%]"),
+            (after, CORRECTED, "after: |corrected|, off the reference [%]"),
+        )
     ):
         left = figure.add_subplot(grid[row, 0])
         left.plot(x, values, ".", ms=1.5, color=colour)
@@ -105,14 +111,24 @@ def _limits(values: NDArray[np.float64]) -> tuple[float, float]:
     return float(low - margin), float(high + margin)
 
 
-def draw_coverage(axes: Axes, hits: NDArray[np.int64]) -> Any:
+def draw_coverage(axes: Axes, hits: NDArray[np.int32]) -> Any:
     """Cells of equal area: azimuth to the right, height upwards. Cells without a reading stay white."""
     counts = np.asarray(hits, dtype=float).reshape(10, 10)
     shown = np.where(counts > 0, np.log10(np.maximum(counts, 1)), np.nan)
     mesh = axes.pcolormesh(
-        np.linspace(0, 360, 11), np.linspace(-1, 1, 11), shown, cmap="viridis", vmin=0, vmax=max(1.0, float(np.nanmax(np.append(shown, 1))))
+        np.linspace(0, 360, 11),
+        np.linspace(-1, 1, 11),
+        shown,
+        cmap="viridis",
+        vmin=0,
+        vmax=max(1.0, float(np.nanmax(np.append(shown, 1)))),
     )
-    axes.set(xlabel="azimuth in the sensor's axes, from x towards y [deg]", ylabel="height (z / radius)", xlim=(0, 360), ylim=(-1, 1))
+    axes.set(
+        xlabel="azimuth in the sensor's axes, from x towards y [deg]",
+        ylabel="height (z / radius)",
+        xlim=(0, 360),
+        ylim=(-1, 1),
+    )
     axes.set_xticks(range(0, 361, 60))
     for x in range(36, 360, 36):
         axes.axvline(x, color="0.9", lw=0.5)
@@ -121,20 +137,18 @@ def draw_coverage(axes: Axes, hits: NDArray[np.int64]) -> Any:
     return mesh
 
 
-def plot_coverage(hits: NDArray[np.int64], what: str) -> Figure:
+def plot_coverage(hits: NDArray[np.int32], what: str) -> Figure:
     figure = new_figure(9, 4.5)
     axes = figure.add_subplot()
     mesh = draw_coverage(axes, hits)
     bar = figure.colorbar(mesh, ax=axes, label="readings in the cell")
     ticks = np.arange(0, np.floor(mesh.get_clim()[1]) + 1)
-    bar.set_ticks(ticks.tolist(), labels=[f"{10**int(t)}" for t in ticks])
+    bar.set_ticks(ticks.tolist(), labels=[f"{10 ** int(t)}" for t in ticks])
     axes.set_title(f"directions of {what}: {int(np.count_nonzero(hits))} of 100 cells of equal area")
     return figure
 
 
-def plot_progress(
-    kept: NDArray[np.float64], fit: Any, missing: NDArray[np.float64], text: str
-) -> Figure:
+def plot_progress(kept: NDArray[np.float64], fit: Any, missing: NDArray[np.float64], text: str) -> Figure:
     """While readings are collected: the corrected directions in space and on the map, and what to do next."""
     figure = new_figure(12, 5)
     axes = figure.add_subplot(1, 2, 1, projection="3d")
@@ -149,7 +163,14 @@ def plot_progress(
     draw_coverage(chart, fit.coverage)
     if np.isfinite(missing).all():
         azimuth = np.rad2deg(np.arctan2(missing[1], missing[0])) % 360
-        chart.plot(azimuth, missing[2], "*", color="tab:red", ms=18, label="point this direction of the sensor along the field")
+        chart.plot(
+            azimuth,
+            missing[2],
+            "*",
+            color="tab:red",
+            ms=18,
+            label="point this direction of the sensor along the field",
+        )
         chart.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18))
     figure.suptitle(text)
     return figure

@@ -1,4 +1,4 @@
-"""What a calibration hands over to be printed, drawn and written: the same for every sub-command of loc-calibrate."""
+"""What a calibration hands over to be printed, drawn and written, the same for every sub-command."""
 
 from __future__ import annotations
 
@@ -20,7 +20,12 @@ _PLAIN = {
     Verdict.WARN: "warn: read the reasons before you use it",
     Verdict.REFUSED: "refused: not to be used",
 }
-_COLOUR = {Verdict.OK: "#1b7837", Verdict.FAIR: "#4d7ea8", Verdict.WARN: "#b35806", Verdict.REFUSED: "#a50026"}
+_COLOUR = {
+    Verdict.OK: "#1b7837",
+    Verdict.FAIR: "#4d7ea8",
+    Verdict.WARN: "#b35806",
+    Verdict.REFUSED: "#a50026",
+}
 
 
 @dataclass
@@ -60,7 +65,8 @@ def verdict_text(verdict: Verdict) -> str:
 def with_sigma(value: float, sigma: float | None, scale: float = 1.0) -> str:
     """ "12.345 ± 0.012": as many digits as the deviation has meaning for."""
     value *= scale
-    if sigma is None or not sigma > 0 or sigma != sigma or sigma == float("inf"):
+    # Not known, or nothing but rounding: a parameter that the method does not estimate.
+    if sigma is None or not 1e-12 * abs(value) < sigma * scale < float("inf"):
         return f"{value:.6g}"
     sigma *= scale
     digits = max(0, 1 - int(f"{sigma:e}".split("e")[1]))
@@ -73,7 +79,9 @@ def _text_table(table: Table) -> list[str]:
     rows = [table.heading, *table.rows]
     width = [max(len(row[i]) for row in rows) for i in range(len(table.heading))]
     return [
-        "  " + row[0].ljust(width[0]) + "".join("  " + cell.rjust(w) for cell, w in zip(row[1:], width[1:], strict=True))
+        "  "
+        + row[0].ljust(width[0])
+        + "".join("  " + cell.rjust(w) for cell, w in zip(row[1:], width[1:], strict=True))
         for row in rows
     ]
 
@@ -99,7 +107,10 @@ def _escape(text: str) -> str:
 def _html_table(table: Table) -> str:
     head = "".join(f"<th>{_escape(cell)}</th>" for cell in table.heading)
     body = "".join(
-        "<tr>" + f"<th>{_escape(row[0])}</th>" + "".join(f"<td>{_escape(cell)}</td>" for cell in row[1:]) + "</tr>"
+        "<tr>"
+        + f"<th>{_escape(row[0])}</th>"
+        + "".join(f"<td>{_escape(cell)}</td>" for cell in row[1:])
+        + "</tr>"
         for row in table.rows
     )
     return f"<h2>{_escape(table.title)}</h2><table><tr>{head}</tr>{body}</table>"
@@ -117,7 +128,10 @@ figcaption { color: #555; } footer { margin-top: 2rem; color: #777; font-size: .
 
 
 def write_report(folder: Path, outcome: Outcome, command: Sequence[str], written: str) -> Path:
-    """The pictures as PNG files and all in one report.html, which needs no other file. written: what became of it."""
+    """The pictures as PNG files and all in one report.html, which needs no other file.
+
+    written: what became of the result. Returns the path of report.html.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     figures = []
     for picture in outcome.pictures:
@@ -129,15 +143,19 @@ def write_report(folder: Path, outcome: Outcome, command: Sequence[str], written
             f"<figcaption>{_escape(picture.caption)}</figcaption></figure>"
         )
     facts = "".join(
-        f'<tr><th>{_escape(name)}</th><td class="text">{_escape(text)}</td></tr>' for name, text in outcome.facts
+        f'<tr><th>{_escape(name)}</th><td class="text">{_escape(text)}</td></tr>'
+        for name, text in outcome.facts
     )
-    counts = "".join(f"<tr><th>{_escape(name)}</th><td>{value}</td></tr>" for name, value in outcome.counts.items())
+    counts = "".join(
+        f"<tr><th>{_escape(name)}</th><td>{value}</td></tr>" for name, value in outcome.counts.items()
+    )
     reasons = "".join(f"<li>{_escape(reason)}</li>" for reason in outcome.reasons)
     notes = "".join(f"<li>{_escape(note)}</li>" for note in outcome.notes)
-    now = datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%d %H:%M UTC")
+    now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
     parts = [
         f"<h1>Calibration: {_escape(outcome.block)}</h1><p>{_escape(outcome.summary)}</p>",
-        f'<p class="verdict" style="background: {_COLOUR[outcome.verdict]}">{_escape(verdict_text(outcome.verdict))}</p>',
+        '<p class="verdict" style="background: '
+        f'{_COLOUR[outcome.verdict]}">{_escape(verdict_text(outcome.verdict))}</p>',
         f"<ul>{reasons}</ul>" if reasons else "",
         f"<p>{_escape(written)}</p>",
         f"<ul>{notes}</ul>" if notes else "",
