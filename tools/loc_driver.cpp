@@ -81,7 +81,7 @@ int main(int argc, char** argv) {
     options.source_name = source.kind + " " + source.path;
     if (wait->count() > 0) options.wait_for_estimator_s = wait_for_estimator;
     if (!config.empty()) loc::load_rig(config);
-    options.live = source.live();
+    options.live = loc::is_live(source.kind);
     // The source is made first and waits in the driver's run() only.
     loc::Driver* running = nullptr;
     source.gps.on_idle = [&running] {

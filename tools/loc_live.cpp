@@ -46,7 +46,7 @@ int main(int argc, char** argv) {
                         : transport == "udpm" ? loc::Transport::kUdpm
                                               : loc::Transport::kHub;
     options.as_fast_as_taken = speed == "max";
-    const bool live = loc::SourceSpec{.kind = kind}.live();
+    const bool live = loc::is_live(kind);
     std::error_code ignored;
     if (!live && !std::filesystem::exists(path, ignored)) throw loc::UsageError("'" + path + "' does not exist");
     if (!options.log_path.empty()) loc::refuse_to_overwrite(path, options.log_path);

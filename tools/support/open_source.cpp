@@ -26,6 +26,10 @@ bool holds_nmea(const std::string& path) {
 
 }  // namespace
 
+bool is_live(const std::string& source_kind) {
+  return source_kind == "gps-serial" || source_kind == "gps-tcp" || source_kind == "gpsd";
+}
+
 std::string guess_source_kind(const std::string& path) {
   if (std::filesystem::is_directory(path)) return "euroc";
   const std::string extension = std::filesystem::path(path).extension();

@@ -12,9 +12,6 @@
 namespace loc {
 
 struct SourceSpec {
-  /// Of a sensor that is connected now, not of a recording.
-  bool live() const { return kind == "gps-serial" || kind == "gps-tcp" || kind == "gpsd"; }
-
   std::string kind;      ///< "euroc", "lcm-log", "csv", "broad", "nmea"; live: "gps-serial", "gps-tcp", "gpsd"
   std::string path;      ///< file, folder, device, HOST:PORT
   CsvOptions csv;        ///< for csv
@@ -22,6 +19,9 @@ struct SourceSpec {
   LiveGpsOptions gps;    ///< for nmea (gps.fix) and the live ones
   int baud = 9600;       ///< for gps-serial
 };
+
+/// A kind that is a sensor connected now, not a recording.
+bool is_live(const std::string& source_kind);
 
 /// Kind of a recording by its looks: a folder is euroc, *.csv csv, *.mat broad, *.nmea nmea, another file that has NMEA
 /// sentences within its first 4 kB nmea, all else lcm-log.
