@@ -1,0 +1,471 @@
+#include "libloc/calib/magnetometer_alignment.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "libloc/calib/least_squares.hpp"
+#include "libloc/core/check.hpp"
+#include "libloc/core/statistics.hpp"
+#include "libloc/geometry/so3.hpp"
+
+namespace loc {
+namespace {
+
+constexpr double kBiasPrior = 0.1;    // [rad/s]: a gyroscope at rest shows less
+constexpr double kDelayPrior = 0.05;  // [s]
+constexpr double kSlowTurn = 0.15;    // [rad] in an interval, up to which its mean readings belong together
+constexpr double kFlatDip = 10 * std::numbers::pi / 180;  // the sign of a smaller dip is not trusted
+constexpr std::size_t kLeastIntervals = 20;
+
+std::string degrees(double angle) {
+  return to_text(std::round(angle * 180 / std::numbers::pi * 100) / 100) + " deg";
+}
+
+double median_norm(const TriadRows& rows) {
+  std::vector<double> norms;
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+    const double n = rows.row(i).norm();
+    if (std::isfinite(n) && n > 0) norms.push_back(n);
+  }
+  return norms.empty() ? kUnknown : quantile(norms, 0.5);
+}
+
+/// Cuts the recording into intervals between two good readings of the field.
+class IntervalBuilder {
+ public:
+  IntervalBuilder(const MagnetometerAlignmentOptions& options, double field, double gravity, double longest_step)
+      : options_(options), field_(field), gravity_(gravity), longest_step_(longest_step) {}
+
+  /// Rows in order of time, all but the field finite. @param up NaN when there is no accelerometer
+  void add(TimeNs time_ns, const Eigen::Vector3d& rate, const Eigen::Vector3d& force, const Eigen::Vector3d& reading) {
+    if (last_ns_ != kNoTime && time_ns <= last_ns_) return;
+    if (last_ns_ != kNoTime) {
+      const double dt = elapsed_s(last_ns_, time_ns);
+      if (dt > longest_step_) {
+        open_ = false;
+      } else if (open_) {
+        integrate(dt, rate);
+      }
+    }
+    last_ns_ = time_ns;
+    last_rate_ = rate;
+    force_sum_ += force;
+    largest_force_error_ = std::max(largest_force_error_, std::abs(force.norm() / gravity_ - 1));
+    ++rows_;
+    take_field(time_ns, reading);
+  }
+
+  std::vector<FieldInterval> intervals;
+  std::int64_t repeated = 0;
+  std::int64_t disturbed = 0;
+  std::int64_t too_fast = 0;
+
+ private:
+  void integrate(double dt, const Eigen::Vector3d& rate) {
+    const Eigen::Vector3d theta = dt / 2 * (last_rate_ + rate) + dt * dt / 12 * last_rate_.cross(rate);
+    if (!(theta.norm() <= std::numbers::pi)) {
+      ++too_fast;
+      open_ = false;
+      return;
+    }
+    const Eigen::Quaterniond turn = so3::exp(theta);
+    now_.d_bias = turn.conjugate().toRotationMatrix() * now_.d_bias - dt * so3::right_jacobian(theta);
+    now_.q_begin_end = (now_.q_begin_end * turn).normalized();
+  }
+
+  void take_field(TimeNs time_ns, const Eigen::Vector3d& reading) {
+    if (!reading.allFinite()) return;
+    if (reading == last_reading_) {
+      ++repeated;
+      return;
+    }
+    last_reading_ = reading;
+    const Eigen::Vector3d m = reading / field_;
+    if (!(std::abs(m.norm() - 1) <= options_.norm_tolerance)) {
+      ++disturbed;
+      open_ = false;
+      return;
+    }
+    if (open_) {
+      field_sum_ += m;
+      ++fields_;
+      if (elapsed_s(start_ns_, time_ns) < options_.interval_s * (1 - 1e-6)) return;
+      now_.end = m;
+      now_.rate_end = last_rate_;
+      now_.field = field_sum_ / fields_;
+      const double turned = Eigen::AngleAxisd(now_.q_begin_end).angle();
+      now_.has_gravity = largest_force_error_ <= options_.force_tolerance && turned <= kSlowTurn;
+      if (now_.has_gravity) now_.up = (force_sum_ / rows_).normalized();
+      intervals.push_back(now_);
+    }
+    now_ = FieldInterval{};
+    now_.begin = m;
+    now_.rate_begin = last_rate_;
+    open_ = true;
+    start_ns_ = time_ns;
+    field_sum_ = m;
+    fields_ = 1;
+    force_sum_.setZero();
+    largest_force_error_ = std::isfinite(gravity_) ? 0 : std::numeric_limits<double>::infinity();
+    rows_ = 0;
+  }
+
+  const MagnetometerAlignmentOptions& options_;
+  double field_;
+  double gravity_;
+  double longest_step_;
+  FieldInterval now_;
+  bool open_ = false;
+  TimeNs last_ns_ = kNoTime;
+  TimeNs start_ns_ = kNoTime;
+  Eigen::Vector3d last_rate_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d last_reading_ = Eigen::Vector3d::Constant(kUnknown);
+  Eigen::Vector3d field_sum_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d force_sum_ = Eigen::Vector3d::Zero();
+  double largest_force_error_ = std::numeric_limits<double>::infinity();
+  double fields_ = 0;
+  double rows_ = 0;
+};
+
+/// Constraint 1 as linear equations in the nine entries of R.
+Eigen::Quaterniond linear_start(const std::vector<FieldInterval>& intervals) {
+  Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
+  for (const FieldInterval& k : intervals) {
+    const Eigen::Matrix3d back = k.q_begin_end.conjugate().toRotationMatrix();
+    Eigen::Matrix<double, 3, 9> a;
+    for (int column = 0; column < 3; ++column) {
+      a.middleCols<3>(3 * column) = k.end[column] * Eigen::Matrix3d::Identity() - k.begin[column] * back;
+    }
+    normal += a.transpose() * a;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> solver(normal);
+  const Eigen::Matrix<double, 9, 1> entries = solver.eigenvectors().col(0);
+  const Eigen::Matrix3d g = Eigen::Map<const Eigen::Matrix3d>(entries.data());
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(g, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d r = svd.matrixU() * svd.matrixV().transpose();
+  if (r.determinant() < 0) r = -r;  // the sign of the solution is free
+  return Eigen::Quaterniond(r).normalized();
+}
+
+double median_residual(const std::vector<FieldInterval>& intervals, const Eigen::Quaterniond& r) {
+  std::vector<double> sizes;
+  for (const FieldInterval& k : intervals) {
+    sizes.push_back(alignment_residual(k, r, AlignmentVector::Zero(), nullptr).head<3>().norm());
+  }
+  return quantile(sizes, 0.5);
+}
+
+/// The linear solution, unless an exchange of axes fits better (when the turning hardly determines it).
+Eigen::Quaterniond best_start(const std::vector<FieldInterval>& intervals) {
+  Eigen::Quaterniond best = linear_start(intervals);
+  double least = median_residual(intervals, best);
+  std::array<int, 3> order = {0, 1, 2};
+  do {
+    for (unsigned signs = 0; signs < 8; ++signs) {
+      Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
+      for (int row = 0; row < 3; ++row) {
+        m(row, order[static_cast<std::size_t>(row)]) = ((signs >> static_cast<unsigned>(row)) & 1U) != 0 ? -1 : 1;
+      }
+      if (m.determinant() < 0) continue;
+      const Eigen::Quaterniond q(m);
+      const double residual = median_residual(intervals, q);
+      if (residual < least) {
+        least = residual;
+        best = q;
+      }
+    }
+  } while (std::next_permutation(order.begin(), order.end()));
+  return best;
+}
+
+struct Weights {
+  Eigen::VectorXd turn;
+  Eigen::VectorXd gravity;
+};
+
+/// One over the robust deviation of each kind of residual, times the root of Tukey's weight.
+Weights weights_at(const std::vector<FieldInterval>& intervals, const Eigen::Quaterniond& start,
+                   const AlignmentVector& x) {
+  std::vector<double> turn;
+  std::vector<double> gravity;
+  for (const FieldInterval& k : intervals) {
+    const Eigen::Vector4d r = alignment_residual(k, start, x, nullptr);
+    for (int i = 0; i < 3; ++i) turn.push_back(r[i]);
+    if (k.has_gravity) gravity.push_back(r[3]);
+  }
+  constexpr double kFloor = 1e-6;  // exact data must not divide by zero
+  const double turn_sigma = std::max(kFloor, robust_sigma(turn));
+  const double gravity_sigma = gravity.empty() ? 1 : std::max(kFloor, robust_sigma(gravity));
+  const auto n = static_cast<Eigen::Index>(intervals.size());
+  Weights w{.turn = Eigen::VectorXd::Zero(n), .gravity = Eigen::VectorXd::Zero(n)};
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const FieldInterval& interval = intervals[static_cast<std::size_t>(k)];
+    const Eigen::Vector4d r = alignment_residual(interval, start, x, nullptr);
+    w.turn[k] = std::sqrt(tukey_weight(r.head<3>().norm() / turn_sigma / std::sqrt(3.0))) / turn_sigma;
+    if (interval.has_gravity) w.gravity[k] = std::sqrt(tukey_weight(r[3] / gravity_sigma)) / gravity_sigma;
+  }
+  return w;
+}
+
+LeastSquaresResult refine(const std::vector<FieldInterval>& intervals, const Eigen::Quaterniond& start,
+                          const Weights& w, const AlignmentVector& x0) {
+  const auto n = static_cast<Eigen::Index>(intervals.size());
+  const ResidualFunction function = [&](const Eigen::VectorXd& x, Eigen::VectorXd& r, Eigen::MatrixXd* jacobian) {
+    r.resize(4 * n + 5);
+    if (jacobian != nullptr) jacobian->setZero(4 * n + 5, 8);
+    Eigen::Matrix<double, 4, 8> j;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const Eigen::Vector4d weight(w.turn[k], w.turn[k], w.turn[k], w.gravity[k]);
+      r.segment<4>(4 * k) = weight.cwiseProduct(
+          alignment_residual(intervals[static_cast<std::size_t>(k)], start, x, jacobian != nullptr ? &j : nullptr));
+      if (jacobian != nullptr) jacobian->middleRows<4>(4 * k) = weight.asDiagonal() * j;
+    }
+    // Weak knowledge of bias, dip and delay, so that each is determined in any recording.
+    r.tail<5>() << x.segment<3>(3) / kBiasPrior, x[6], x[7] / kDelayPrior;
+    if (jacobian != nullptr) {
+      for (int i = 0; i < 3; ++i) (*jacobian)(4 * n + i, 3 + i) = 1 / kBiasPrior;
+      (*jacobian)(4 * n + 3, 6) = 1;
+    }
+  };
+  return minimise(function, x0, {.max_iterations = 30});
+}
+
+/// The signed axes that the matrix is nearest to, and by how much it is off.
+void name_axes(MagnetometerAlignment& out) {
+  Eigen::Matrix3d nearest = Eigen::Matrix3d::Zero();
+  for (int row = 0; row < 3; ++row) {
+    int column = 0;
+    out.matrix.row(row).cwiseAbs().maxCoeff(&column);
+    nearest(row, column) = out.matrix(row, column) > 0 ? 1 : -1;
+    out.axes += (row > 0 ? " " : "") + std::string(nearest(row, column) < 0 ? "-" : "") + "xyz"[column];
+  }
+  constexpr double kNear = 20 * std::numbers::pi / 180;
+  const Eigen::Matrix3d rest = out.matrix * nearest.transpose();
+  const bool is_exchange = std::abs(std::abs(nearest.determinant()) - 1) < 1e-9 && rest.determinant() > 0;
+  out.permuted = is_exchange && !nearest.isIdentity() && Eigen::AngleAxisd(rest).angle() < kNear;
+}
+
+void judge(const MagnetometerAlignmentOptions& options, MagnetometerAlignment& out) {
+  if (out.second_axis_share < options.least_second_axis) {
+    out.quality.lower_to(Verdict::kRefused, "The device was turned about one axis only (second axis " +
+                                                to_text(std::round(out.second_axis_share * 1000) / 10) +
+                                                " % of the first): turn it about the others too.");
+  }
+  if (!(out.sigma <= options.ok_sigma)) {
+    const Verdict verdict = out.sigma <= options.fair_sigma   ? Verdict::kFair
+                            : out.sigma <= options.warn_sigma ? Verdict::kWarn
+                                                              : Verdict::kRefused;
+    out.quality.lower_to(verdict, "Predicted deviation of the rotation " + degrees(out.sigma) + ", ok is up to " +
+                                      degrees(options.ok_sigma) + ": turn the device more, about all axes.");
+  }
+  if (5 * out.inliers < 4 * out.intervals) {
+    out.quality.lower_to(Verdict::kWarn, "Only " + std::to_string(out.inliers) + " of " +
+                                             std::to_string(out.intervals) + " intervals fit: the field is disturbed.");
+  }
+  constexpr double kWideScatter = 5 * std::numbers::pi / 180;
+  if (out.dip_scatter > kWideScatter) {
+    out.quality.lower_to(Verdict::kWarn, "The dip angle scatters by " + degrees(out.dip_scatter) +
+                                             ": the field is disturbed, or the magnetometer not well calibrated.");
+  }
+  if (out.mirrored) {
+    out.quality.lower_to(
+        Verdict::kWarn,
+        "The magnetometer is mirrored (left-handed) against the IMU: an odd number of its axes has the "
+        "wrong sign. The matrix corrects it.");
+  }
+  if (!std::isnan(options.expected_dip) && !out.mirror_checked) {
+    out.quality.lower_to(Verdict::kFair,
+                         "Whether the magnetometer is mirrored cannot be told: the dip is too small, or "
+                         "gravity was not seen.");
+  }
+  if (out.permuted) {
+    out.quality.lower_to(Verdict::kFair, "The magnetometer's axes are exchanged: body x y z are nearest to its " +
+                                             out.axes + ". The matrix corrects it.");
+  }
+}
+
+}  // namespace
+
+void MagnetometerAlignmentOptions::check() const {
+  require_positive("interval_s", interval_s);
+  require(std::isnan(expected_dip) || std::abs(expected_dip) <= std::numbers::pi / 2, "expected_dip", expected_dip,
+          "must be in [-pi/2, pi/2], or NaN");
+  require_positive("norm_tolerance", norm_tolerance);
+  require_positive("force_tolerance", force_tolerance);
+  require(std::isfinite(gap_periods) && gap_periods > 1, "gap_periods", gap_periods, "must be above 1");
+  require_not_negative("least_second_axis", least_second_axis);
+  require_positive("ok_sigma", ok_sigma);
+  require(std::isfinite(fair_sigma) && fair_sigma >= ok_sigma, "fair_sigma", fair_sigma, "must not be below ok_sigma");
+  require(std::isfinite(warn_sigma) && warn_sigma >= fair_sigma, "warn_sigma", warn_sigma,
+          "must not be below fair_sigma");
+}
+
+Eigen::Vector4d alignment_residual(const FieldInterval& interval, const Eigen::Quaterniond& start,
+                                   const AlignmentVector& x, Eigen::Matrix<double, 4, 8>* jacobian) {
+  const Eigen::Vector3d theta = x.head<3>();
+  const Eigen::Vector3d bias = x.segment<3>(3);
+  const Eigen::Matrix3d r = (start * so3::exp(theta)).toRotationMatrix();
+  const Eigen::Vector3d turn_error = interval.d_bias * bias;
+  const Eigen::Matrix3d back = (interval.q_begin_end * so3::exp(turn_error)).conjugate().toRotationMatrix();
+  // Of so much before the time stamp: the field has turned on against the body by then.
+  const double delay = x[7];
+  const Eigen::Matrix3d later_begin = Eigen::Matrix3d::Identity() - delay * so3::hat(interval.rate_begin);
+  const Eigen::Matrix3d later_end = Eigen::Matrix3d::Identity() - delay * so3::hat(interval.rate_end);
+  const Eigen::Vector3d begin = r * interval.begin;
+  const Eigen::Vector3d end = r * interval.end;
+  const Eigen::Vector3d carried = back * (later_begin * begin);
+  Eigen::Vector4d out;
+  out.head<3>() = later_end * end - carried;
+  out[3] = interval.has_gravity ? interval.up.dot(r * interval.field) + x[6] : 0;
+  if (jacobian != nullptr) {
+    jacobian->setZero();
+    const Eigen::Matrix3d right = so3::right_jacobian(theta);
+    jacobian->topLeftCorner<3, 3>() =
+        (back * later_begin * r * so3::hat(interval.begin) - later_end * r * so3::hat(interval.end)) * right;
+    jacobian->block<3, 3>(0, 3) = -so3::hat(carried) * so3::right_jacobian(turn_error) * interval.d_bias;
+    jacobian->block<3, 1>(0, 7) = back * interval.rate_begin.cross(begin) - interval.rate_end.cross(end);
+    if (interval.has_gravity) {
+      jacobian->block<1, 3>(3, 0) = -interval.up.transpose() * r * so3::hat(interval.field) * right;
+      (*jacobian)(3, 6) = 1;
+    }
+  }
+  return out;
+}
+
+MagnetometerAlignment align_magnetometer(std::span<const TimeNs> times_ns, const TriadRows& gyroscope,
+                                         const TriadRows& accelerometer, const TriadRows& magnetometer,
+                                         const MagnetometerAlignmentOptions& options) {
+  options.check();
+  const auto n = static_cast<Eigen::Index>(times_ns.size());
+  require(gyroscope.rows() == n, "rows of gyroscope", static_cast<double>(gyroscope.rows()),
+          "must be as many as times");
+  require(magnetometer.rows() == n, "rows of magnetometer", static_cast<double>(magnetometer.rows()),
+          "must be as many as times");
+  require(accelerometer.rows() == 0 || accelerometer.rows() == n, "rows of accelerometer",
+          static_cast<double>(accelerometer.rows()), "must be as many as times, or none");
+
+  MagnetometerAlignment out;
+  const auto refuse = [&](std::string reason) {
+    out.quality.lower_to(Verdict::kRefused, std::move(reason));
+    return out;
+  };
+  const double field = median_norm(magnetometer);
+  const double gravity = median_norm(accelerometer);
+  std::vector<double> periods;
+  TimeNs last = kNoTime;
+  for (const TimeNs t : times_ns) {
+    if (t == kNoTime) continue;
+    if (last != kNoTime && t > last) periods.push_back(elapsed_s(last, t));
+    last = t;
+  }
+  if (std::isnan(field) || periods.empty()) return refuse("There is no usable reading of the magnetometer.");
+
+  IntervalBuilder builder(options, field, gravity, options.gap_periods * quantile(periods, 0.5));
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Vector3d force =
+        accelerometer.rows() == 0 ? Eigen::Vector3d::Zero().eval() : Eigen::Vector3d(accelerometer.row(i));
+    const TimeNs t = times_ns[static_cast<std::size_t>(i)];
+    if (t == kNoTime || !gyroscope.row(i).allFinite() || !force.allFinite()) {
+      ++out.not_finite;
+      continue;
+    }
+    builder.add(t, gyroscope.row(i), force, magnetometer.row(i));
+  }
+  const std::vector<FieldInterval>& intervals = builder.intervals;
+  out.repeated = builder.repeated;
+  out.disturbed = builder.disturbed;
+  out.too_fast = builder.too_fast;
+  out.intervals = static_cast<std::int64_t>(intervals.size());
+  if (intervals.size() < kLeastIntervals) {
+    return refuse("Only " + std::to_string(intervals.size()) + " intervals with a steady field: at least " +
+                  std::to_string(kLeastIntervals) + " of " + to_text(options.interval_s) + " s are needed.");
+  }
+  Eigen::Matrix3d turning = Eigen::Matrix3d::Zero();
+  for (const FieldInterval& k : intervals) {
+    const Eigen::Vector3d angle = so3::log(k.q_begin_end);
+    turning += angle * angle.transpose();
+    out.gravity_readings += k.has_gravity ? 1 : 0;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(turning);
+  const double total = spread.eigenvalues()[2];
+  out.second_axis_share = total > 0 ? std::sqrt(std::max(0.0, spread.eigenvalues()[1]) / total) : 0;
+
+  Eigen::Quaterniond r = best_start(intervals);
+  AlignmentVector x = AlignmentVector::Zero();
+  if (out.gravity_readings > 0) {
+    std::vector<double> sines;
+    for (const FieldInterval& k : intervals) {
+      if (k.has_gravity) sines.push_back(-k.up.dot(r * k.field));
+    }
+    x[6] = quantile(sines, 0.5);
+  }
+  LeastSquaresResult result;
+  Weights w;
+  for (int round = 0; round < 8; ++round) {
+    w = weights_at(intervals, r, x);
+    result = refine(intervals, r, w, x);
+    r = so3::boxplus(r, result.x.head<3>());
+    const double step = result.x.head<3>().norm();
+    x = result.x;
+    x.head<3>().setZero();
+    if (step < 1e-9) break;
+  }
+  const auto cov = covariance_from(result.information);
+  if (!cov || !x.allFinite())
+    return refuse("The turning does not determine the rotation: turn the device about all axes.");
+
+  out.solved = true;
+  out.matrix = r.toRotationMatrix();
+  out.cov = cov->topLeftCorner<3, 3>();
+  out.sigma = std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(out.cov).eigenvalues()[2]);
+  out.angle = Eigen::AngleAxisd(r).angle();
+  out.gyroscope_bias = x.segment<3>(3);
+  out.delay_s = x[7];
+  out.delay_sigma_s = std::sqrt((*cov)(7, 7));
+  std::vector<double> sizes;
+  std::vector<double> dips;
+  for (std::size_t k = 0; k < intervals.size(); ++k) {
+    if (w.turn[static_cast<Eigen::Index>(k)] > 0) {
+      sizes.push_back(alignment_residual(intervals[k], r, x, nullptr).head<3>().norm());
+    }
+    if (intervals[k].has_gravity) {
+      dips.push_back(std::asin(std::clamp(-intervals[k].up.dot(r * intervals[k].field.normalized()), -1.0, 1.0)));
+    }
+  }
+  out.inliers = static_cast<std::int64_t>(sizes.size());
+  if (!sizes.empty()) out.residual_rms = root_mean_square(sizes);
+  if (!dips.empty()) {
+    out.dip = quantile(dips, 0.5);
+    out.dip_sigma = std::sqrt((*cov)(6, 6)) / std::max(0.05, std::cos(out.dip));
+    for (double& d : dips) d -= out.dip;
+    out.dip_scatter = robust_sigma(dips);
+  }
+  if (std::abs(options.expected_dip) > kFlatDip && std::abs(out.dip) > kFlatDip) {
+    out.mirror_checked = true;
+    out.mirrored = (options.expected_dip > 0) != (out.dip > 0);
+    if (out.mirrored) {
+      out.matrix = -out.matrix;
+      out.dip = -out.dip;
+    }
+  }
+  name_axes(out);
+  judge(options, out);
+  return out;
+}
+
+TriadCalibration aligned(const TriadCalibration& magnetometer, const MagnetometerAlignment& alignment) {
+  if (!alignment.solved) {
+    std::string text = "the magnetometer's alignment is not solved";
+    for (const std::string& reason : alignment.quality.reasons) text += "; " + reason;
+    throw DataError(text);
+  }
+  return {.bias = magnetometer.bias, .matrix = alignment.matrix * magnetometer.matrix};
+}
+
+}  // namespace loc

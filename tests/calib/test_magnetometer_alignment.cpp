@@ -1,0 +1,258 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <vector>
+
+#include "libloc/calib/magnetometer_alignment.hpp"
+#include "libloc/core/check.hpp"
+#include "libloc/core/random.hpp"
+#include "libloc/core/statistics.hpp"
+#include "libloc/io/broad.hpp"
+#include "support/data.hpp"
+#include "support/numeric_jacobian.hpp"
+#include "support/pose_sequence.hpp"
+
+namespace loc {
+namespace {
+
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+constexpr double kDegree = std::numbers::pi / 180;
+const double kDip = std::atan2(40, 20);
+const Rows kAbsent(0, 3);
+
+struct Recording {
+  test::PoseSequence body;
+  Rows magnetometer;
+};
+
+/// @param to_magnetometer what makes the magnetometer's axes from the body's
+Recording recording(std::uint64_t seed, const Eigen::Matrix3d& to_magnetometer, double noise = 3e-7) {
+  Random random(seed);
+  Recording r;
+  r.body.rest_s = 1;
+  r.body.sigma_gyroscope = 2e-3;
+  r.body.sigma_accelerometer = 2e-2;
+  r.body.gyroscope_bias = {0.01, -0.004, 0.006};
+  r.body.run(12, random);
+  r.magnetometer = r.body.magnetometer * to_magnetometer.transpose();
+  for (Eigen::Index i = 0; i < r.magnetometer.rows(); ++i) r.magnetometer.row(i) += noise * random.normal3();
+  return r;
+}
+
+MagnetometerAlignment align(const Recording& r, const MagnetometerAlignmentOptions& options = {}) {
+  return align_magnetometer(r.body.times_ns, r.body.gyroscope, r.body.accelerometer, r.magnetometer, options);
+}
+
+/// Rotation vector by which the result is off, on the right.
+Eigen::Vector3d error_of(const MagnetometerAlignment& a, const Eigen::Matrix3d& to_magnetometer) {
+  return so3::log(Eigen::Quaterniond(Eigen::Matrix3d(to_magnetometer * a.matrix)).conjugate());
+}
+
+TEST(MagnetometerAlignment, JacobianIsTheDerivative) {
+  Random random(1);
+  for (int i = 0; i < 10; ++i) {
+    FieldInterval k;
+    k.q_begin_end = so3::exp(0.5 * random.normal3());
+    k.d_bias = 0.25 * Eigen::Matrix3d::Random();
+    k.begin = random.direction();
+    k.end = random.direction();
+    k.field = random.direction();
+    k.up = random.direction();
+    k.rate_begin = random.normal3();
+    k.rate_end = random.normal3();
+    k.has_gravity = true;
+    const Eigen::Quaterniond start = random.rotation();
+    AlignmentVector x;
+    x << 0.2 * random.normal3(), 0.2 * random.normal3(), 0.5, 0.02;
+    Eigen::Matrix<double, 4, 8> jacobian;
+    alignment_residual(k, start, x, &jacobian);
+    const auto f = [&](const AlignmentVector& at) { return alignment_residual(k, start, at, nullptr); };
+    EXPECT_TRUE(test::near(jacobian, test::numeric_jacobian(f, x), 1e-8));
+  }
+}
+
+TEST(MagnetometerAlignment, AnyRotationWithinItsSigma) {
+  std::vector<double> nees;
+  for (std::uint64_t seed = 1; seed <= 25; ++seed) {
+    Random random(seed + 1000);
+    const Eigen::Matrix3d turn = random.rotation().toRotationMatrix();
+    const MagnetometerAlignment a = align(recording(seed, turn), {.expected_dip = kDip});
+    ASSERT_TRUE(a.solved);
+    EXPECT_FALSE(a.mirrored) << seed;
+    const Eigen::Vector3d e = error_of(a, turn);
+    nees.push_back(e.dot(a.cov.ldlt().solve(e)));
+    EXPECT_LT(e.norm(), 0.3 * kDegree) << seed;
+    EXPECT_LT(a.sigma, 0.3 * kDegree);
+    EXPECT_LT(std::abs(a.delay_s), 4 * a.delay_sigma_s);
+    EXPECT_NEAR(a.dip, kDip, 0.2 * kDegree);
+    EXPECT_LT(a.dip_scatter, 1 * kDegree);
+    EXPECT_LT((a.gyroscope_bias - Eigen::Vector3d(0.01, -0.004, 0.006)).norm(), 3e-3);
+  }
+  std::printf("NEES %.2f of 3\n", mean(nees));
+  // Neighbouring intervals share a reading, whose error cancels: the prediction is on the safe side.
+  EXPECT_GT(mean(nees), 0.3);
+  EXPECT_LT(mean(nees), 4.5);
+}
+
+TEST(MagnetometerAlignment, ExchangedAxesAreNamed) {
+  Eigen::Matrix3d exchange;
+  exchange << 0, 1, 0, -1, 0, 0, 0, 0, 1;
+  const MagnetometerAlignment a = align(recording(2, exchange), {.expected_dip = kDip});
+  EXPECT_TRUE(a.permuted);
+  EXPECT_EQ(a.axes, "-y x z");
+  EXPECT_EQ(a.quality.verdict, Verdict::kFair);
+  EXPECT_LT(error_of(a, exchange).norm(), 0.3 * kDegree);
+  const MagnetometerAlignment straight = align(recording(2, Eigen::Matrix3d::Identity()), {.expected_dip = kDip});
+  EXPECT_FALSE(straight.permuted);
+  EXPECT_EQ(straight.axes, "x y z");
+  EXPECT_EQ(straight.quality.verdict, Verdict::kOk);
+}
+
+TEST(MagnetometerAlignment, MirroredIsToldByTheSignOfTheDip) {
+  const Eigen::Matrix3d mirror = Eigen::Vector3d(1, 1, -1).asDiagonal();
+  const Recording r = recording(3, mirror);
+  const MagnetometerAlignment told = align(r, {.expected_dip = kDip});
+  EXPECT_TRUE(told.mirror_checked);
+  EXPECT_TRUE(told.mirrored);
+  EXPECT_EQ(told.quality.verdict, Verdict::kWarn);
+  EXPECT_LT((told.matrix - mirror).norm(), 0.01);
+  EXPECT_NEAR(told.dip, kDip, 0.2 * kDegree);
+  EXPECT_EQ(told.axes, "x y -z");
+  // Without knowing the hemisphere it is a turn by 180 degrees in a reversed field, and says that it was not checked.
+  const MagnetometerAlignment untold = align(r);
+  EXPECT_FALSE(untold.mirror_checked);
+  EXPECT_LT((untold.matrix + mirror).norm(), 0.01);
+  EXPECT_NEAR(untold.dip, -kDip, 0.2 * kDegree);
+}
+
+TEST(MagnetometerAlignment, ALateMagnetometer) {
+  const Eigen::Matrix3d turn = so3::exp({0.3, 0.2, -0.4}).toRotationMatrix();
+  Recording r = recording(8, turn);
+  const Rows now = r.magnetometer;
+  for (Eigen::Index i = 2; i < now.rows(); ++i) r.magnetometer.row(i) = now.row(i - 2);  // 20 ms
+  const MagnetometerAlignment a = align(r);
+  EXPECT_NEAR(a.delay_s, 0.02, 1e-3);
+  EXPECT_LT(error_of(a, turn).norm(), 0.4 * kDegree);
+}
+
+TEST(MagnetometerAlignment, WithoutAccelerometer) {
+  const Recording r = recording(4, Eigen::Matrix3d::Identity());
+  const MagnetometerAlignment a =
+      align_magnetometer(r.body.times_ns, r.body.gyroscope, kAbsent, r.magnetometer, {.expected_dip = kDip});
+  ASSERT_TRUE(a.solved);
+  EXPECT_LT(error_of(a, Eigen::Matrix3d::Identity()).norm(), 0.4 * kDegree);
+  EXPECT_TRUE(std::isnan(a.dip));
+  EXPECT_FALSE(a.mirror_checked);
+  EXPECT_EQ(a.quality.verdict, Verdict::kFair);
+}
+
+TEST(MagnetometerAlignment, OneAxisIsRefused) {
+  Random random(5);
+  for (const Eigen::Vector3d& axis : {Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(1, 1, 0.3)}) {
+    Recording r = recording(5, Eigen::Matrix3d::Identity());
+    Eigen::Quaterniond q = random.rotation();
+    for (Eigen::Index i = 0; i < r.magnetometer.rows(); ++i) {
+      const Eigen::Vector3d rate = axis.normalized() * std::sin(0.01 * static_cast<double>(i));
+      q = so3::boxplus(q, 0.01 * rate);
+      r.body.gyroscope.row(i) = rate + 2e-3 * random.normal3();
+      r.body.accelerometer.row(i) = q.conjugate() * Eigen::Vector3d(0, 0, 9.81) + 0.02 * random.normal3();
+      r.magnetometer.row(i) = q.conjugate() * r.body.field + 3e-7 * random.normal3();
+    }
+    const MagnetometerAlignment a = align(r);
+    EXPECT_EQ(a.quality.verdict, Verdict::kRefused);
+    EXPECT_LT(a.second_axis_share, 0.1);
+  }
+}
+
+TEST(MagnetometerAlignment, SlowMagnetometerAndDisturbance) {
+  Recording r = recording(6, so3::exp({0.3, 0.2, -0.4}).toRotationMatrix());
+  for (Eigen::Index i = 0; i < r.magnetometer.rows(); ++i) {
+    // Ten times slower: repeated in one half of the recording, NaN in the other.
+    if (i % 10 != 0 && i < 1500) r.magnetometer.row(i) = r.magnetometer.row(i - i % 10);
+    if (i % 10 != 0 && i >= 1500) r.magnetometer.row(i).setConstant(std::nan(""));
+  }
+  // A magnet for two seconds, which hardly changes the length.
+  for (Eigen::Index i = 2000; i < 2200; i += 10) {
+    r.magnetometer.row(i) += Eigen::Vector3d(4e-6, 8e-6, 0);
+  }
+  r.body.gyroscope(700, 0) = std::nan("");
+  r.body.times_ns[800] = r.body.times_ns[790];
+  const MagnetometerAlignment a = align(r);
+  ASSERT_TRUE(a.solved);
+  EXPECT_LT(error_of(a, so3::exp({0.3, 0.2, -0.4}).toRotationMatrix()).norm(), 1 * kDegree);
+  EXPECT_GT(a.repeated, 1300);
+  EXPECT_EQ(a.not_finite, 1);
+}
+
+TEST(MagnetometerAlignment, HostileInput) {
+  EXPECT_EQ(align_magnetometer({}, kAbsent, kAbsent, kAbsent).quality.verdict, Verdict::kRefused);
+  Recording r = recording(7, Eigen::Matrix3d::Identity());
+  const auto verdict = [&] { return align(r).quality.verdict; };
+  const Rows good = r.magnetometer;
+  r.magnetometer.setConstant(std::nan(""));
+  EXPECT_EQ(verdict(), Verdict::kRefused);
+  r.magnetometer.setZero();
+  EXPECT_EQ(verdict(), Verdict::kRefused);
+  r.magnetometer.setConstant(3e-5);
+  EXPECT_EQ(verdict(), Verdict::kRefused);
+  r.magnetometer = good * 1e200;
+  EXPECT_NO_THROW(verdict());
+  r.magnetometer = good;
+  r.body.gyroscope.setConstant(1e200);
+  EXPECT_FALSE(align(r).quality.usable());
+  r.body.gyroscope.setZero();
+  EXPECT_FALSE(align(r).quality.usable());
+  EXPECT_THROW(align_magnetometer(r.body.times_ns, kAbsent, kAbsent, good), std::invalid_argument);
+  EXPECT_THROW(align_magnetometer(r.body.times_ns, r.body.gyroscope, kAbsent, kAbsent), std::invalid_argument);
+  EXPECT_THROW(align(r, {.interval_s = 0}), std::invalid_argument);
+  EXPECT_THROW(align(r, {.expected_dip = 2}), std::invalid_argument);
+  EXPECT_THROW(aligned({}, {}), DataError);
+}
+
+TEST(MagnetometerAlignment, GoesIntoTheRig) {
+  TriadCalibration triad{.bias = {1, 2, 3}, .matrix = 2 * Eigen::Matrix3d::Identity()};
+  MagnetometerAlignment a;
+  a.solved = true;
+  a.matrix = so3::exp({0, 0, std::numbers::pi / 2}).toRotationMatrix();
+  EXPECT_TRUE(test::near(aligned(triad, a).apply({2, 2, 3}), Eigen::Vector3d(0, 2, 0), 1e-12));
+}
+
+// The magnetometer of BROAD's device, as it is and turned by a known rotation.
+TEST(MagnetometerAlignmentReal, Broad) {
+  LOC_DATA_OR_SKIP(folder, "broad");
+  const Eigen::Matrix3d turn = so3::exp({1, -2, 0.5}).toRotationMatrix();
+  for (const char* name : {"01_undisturbed_slow_rotation_A.mat", "07_undisturbed_fast_rotation_B.mat",
+                           "21_undisturbed_fast_combined.mat"}) {
+    const BroadTrial trial = read_broad_trial(folder / name);
+    const Rows turned = trial.magnetic_field * turn.transpose();
+    const auto run = [&](const Rows& field) {
+      return align_magnetometer(trial.time_ns, trial.angular_velocity, trial.specific_force, field,
+                                {.expected_dip = 1.15});
+    };
+    const MagnetometerAlignment as_is = run(trial.magnetic_field);
+    const MagnetometerAlignment known = run(turned);
+    const double difference =
+        so3::log(Eigen::Quaterniond(Eigen::Matrix3d(known.matrix * turn * as_is.matrix.transpose()))).norm();
+    std::printf(
+        "%-36s %.2f deg from the IMU, sigma %.2f, rms %.2f deg, dip %.1f scatter %.1f, delay %.1f +- %.1f ms, %lld of "
+        "%lld intervals, turned "
+        "again %.4f deg, %s\n",
+        name, as_is.angle / kDegree, as_is.sigma / kDegree, as_is.residual_rms / kDegree, as_is.dip / kDegree,
+        as_is.dip_scatter / kDegree, 1e3 * as_is.delay_s, 1e3 * as_is.delay_sigma_s,
+        static_cast<long long>(as_is.inliers), static_cast<long long>(as_is.intervals), difference / kDegree,
+        verdict_name(as_is.quality.verdict));
+    ASSERT_TRUE(as_is.solved);
+    EXPECT_TRUE(as_is.quality.usable());
+    EXPECT_FALSE(as_is.mirrored);
+    EXPECT_LT(as_is.angle, 1.5 * kDegree);
+    // One device: the same delay in every recording.
+    EXPECT_NEAR(as_is.delay_s, 13.3e-3, 1e-3);
+    EXPECT_LT(difference, 0.01 * kDegree);
+  }
+}
+
+}  // namespace
+}  // namespace loc
