@@ -3,7 +3,10 @@
 import subprocess
 import sys
 
+import numpy as np
 from support import CHECKOUT, data_folder, turning_body, write_csv, write_log
+
+import libloc
 
 EXAMPLES = CHECKOUT / "python/examples"
 
@@ -45,3 +48,30 @@ def test_reading_a_log(tmp_path):
     assert "LOC_IMU                 imu_t                      400       1.995      200.00" in text
     assert (tmp_path / "imu.png").stat().st_size > 20_000
     assert "absent" in run("02_read_lcm_log.py", tmp_path / "absent", code=1)
+
+
+def test_calibrating_a_magnetometer(tmp_path):
+    text = run("03_calibrate_magnetometer.py", "--output", tmp_path)
+    assert "verdict: ok" in text
+    assert float(text.split("error of the centre: ")[1].split()[0]) < 0.3
+    assert (tmp_path / "spheres.png").stat().st_size > 20_000
+    # The plain formula believes the outliers.
+    lsq = run("03_calibrate_magnetometer.py", "--method", "lsq", "--output", tmp_path / "lsq")
+    assert float(lsq.split("error of the centre: ")[1].split()[0]) > 1
+    quality = libloc.read_rig(tmp_path / "rig.yaml").magnetometer.triad.quality
+    assert (quality.method, quality.verdict) == ("robust", libloc.Verdict.OK)
+
+
+def test_calibrating_the_magnetometer_of_a_recording(tmp_path):
+    write_csv(tmp_path / "own.csv", turning_body(4000))
+    text = run(
+        "03_calibrate_magnetometer.py", tmp_path / "own.csv", "--field-ut", 48.332, "--output", tmp_path
+    )
+    assert "4000 readings" in text
+    triad = libloc.read_rig(tmp_path / "rig.yaml").magnetometer.triad
+    assert np.abs(triad.bias).max() < 0.3e-6
+    still = turning_body(200)
+    still.field[:] = still.field[0]
+    write_csv(tmp_path / "still.csv", still)
+    assert "refused" in run("03_calibrate_magnetometer.py", tmp_path / "still.csv", code=1)
+    assert "no such file" in run("03_calibrate_magnetometer.py", tmp_path / "absent.csv", code=1)
