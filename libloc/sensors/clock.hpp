@@ -78,6 +78,8 @@ class ClockModel {
   bool ready() const { return bin_count_ > 0; }
   /// The last samples, three or more in a row, do not fit the line: one of the clocks may have been set.
   bool doubtful() const { return aside_count_ >= 3; }
+  /// The last sample was set aside; what it was shows with the next ones.
+  bool undecided() const { return aside_count_ > 0; }
   const ClockLine& line() const { return line_; }  ///< what is known now; meaningful when ready()
   /// Mean lateness of samples above the line [ns].
   double mean_jitter_ns() const { return jitter_ns_; }

@@ -91,9 +91,11 @@ void GpsClock::update(const GpsTimeEvent& event) {
   }
   if (!pulse) {
     take_label(mend_rollover(event.gps_time_ns, event.host_time_ns), event.host_time_ns);
+    count_epochs();
     return;
   }
   const std::optional<std::int64_t> index = take_pulse(event.host_time_ns);
+  count_epochs();
   if (!index || event.gps_time_ns == kNoTime) return;
   // Paired already: the label comes with the pulse and must be a whole second.
   const TimeNs gps = mend_rollover(event.gps_time_ns, event.host_time_ns);
@@ -102,6 +104,15 @@ void GpsClock::update(const GpsTimeEvent& event) {
     return;
   }
   vote(seconds_of(gps) - *index);
+}
+
+// Another line, not the first one, and one that answers are made of: the host's clock was set.
+void GpsClock::count_epochs() {
+  const bool pulses = pulse_epoch_ > 0 && pulse_model_.epoch() != pulse_epoch_;
+  const bool labels = label_epoch_ > 0 && label_model_.epoch() != label_epoch_ && !second_;
+  if (pulses || labels) ++epoch_;
+  pulse_epoch_ = pulse_model_.epoch();
+  label_epoch_ = label_model_.epoch();
 }
 
 // @returns the index of the pulse in its train.
@@ -173,7 +184,6 @@ void GpsClock::take_label(TimeNs gps_ns, TimeNs host_ns) {
     locked_ = false;
     second_.reset();
     vote_count_ = 0;
-    ++epoch_;
     return;
   }
   const TimeNs since = pulse_model_.line().inverse().convert(host_ns);
@@ -212,7 +222,6 @@ void GpsClock::vote(std::int64_t second) {
   const bool majority = 2 * static_cast<std::size_t>(same) > count;
   if (!second_ && majority && same >= kVotesToBegin) {
     second_ = second;
-    ++epoch_;
   } else if (second_ && majority && same >= kVotesToChange) {
     second_ = second;
     disagreeing_in_a_row_ = 0;

@@ -67,14 +67,15 @@ class GpsClock {
   void update(const GpsTimeEvent& event);
 
   /// GPS time (without leap seconds) of a host time; nullopt when it is not known. Never steps back for increasing host
-  /// times unless epoch() has changed: then what was said before was wrong, or the host's clock was set.
+  /// times unless epoch() has changed: then what was said before was wrong, or the host's clock was set. (When pulses
+  /// take the place of labels, time slows down for as long as labels were ahead; sigma says so.)
   std::optional<ClockStamp> convert(TimeNs host_time_ns);
   /// As convert(), without the promise that times increase, and without changing anything.
   std::optional<ClockStamp> convert_once(TimeNs host_time_ns) const;
   /// Host -> GPS as it is known now. nullopt as GpsClockBasis::kNone.
   std::optional<ClockLine> line() const;
   GpsClockBasis basis() const;
-  std::int64_t epoch() const { return epoch_ + pulse_model_.epoch() + label_model_.epoch(); }
+  std::int64_t epoch() const { return epoch_; }
   const GpsClockCounts& counts() const { return counts_; }
   const ClockModel& pulse_model() const { return pulse_model_; }  ///< GPS seconds from the first pulse -> host
   const ClockModel& label_model() const { return label_model_; }  ///< labels -> their arrival
@@ -89,6 +90,7 @@ class GpsClock {
   void take_label(TimeNs gps_ns, TimeNs host_ns);
   TimeNs mend_rollover(TimeNs gps_ns, TimeNs host_ns);
   void vote(std::int64_t second);
+  void count_epochs();
   bool pulses_answer() const;
 
   GpsClockOptions options_;
@@ -106,6 +108,8 @@ class GpsClock {
   std::optional<std::int64_t> second_;
   int disagreeing_in_a_row_ = 0;
   std::int64_t epoch_ = 0;
+  std::int64_t pulse_epoch_ = 0;  // of the models, as counted in epoch_
+  std::int64_t label_epoch_ = 0;
   MonotoneTime monotone_;
   std::int64_t monotone_epoch_ = 0;
   GpsClockCounts counts_;
