@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "libloc/calib/ellipsoid_detail.hpp"
+#include "libloc/calib/least_squares.hpp"
 #include "libloc/core/random.hpp"
 
 namespace loc::detail {
@@ -33,18 +34,12 @@ bool positive_definite(const Eigen::Matrix3d& m) {
   return llt.info() == Eigen::Success && llt.matrixL().toDenseMatrix().diagonal().minCoeff() > 1e-9;
 }
 
-// Tukey's loss, 1 beyond c, and the weight psi(r)/r, 1 at 0.
+// Tukey's loss, 1 beyond c.
 double tukey_loss(double ratio_squared) {
   if (ratio_squared >= 1) return 1;
   const double inside = 1 - ratio_squared;
   return 1 - inside * inside * inside;
 }
-double tukey_weight(double ratio_squared) {
-  if (ratio_squared >= 1) return 0;
-  const double inside = 1 - ratio_squared;
-  return inside * inside;
-}
-
 // Least squares of the robust cost: c^2/6 sum tukey(r / (c sigma)) + prior.
 class Problem {
  public:
@@ -79,13 +74,12 @@ class Problem {
   void linearise(const Ellipsoid& e, double sigma, Matrix9& hessian, Vector9& gradient) const {
     hessian.setZero();
     gradient.setZero();
-    const double bound = options_.tukey_c * sigma;
     Vector9 jacobian;
     for (Eigen::Index i = 0; i < readings_.z.cols(); ++i) {
       double distance = 0;
       if (!sampson_distance(e, readings_.z.col(i), distance, &jacobian)) continue;
       const double weight = readings_.weights[i];
-      const double w = tukey_weight(distance * distance * weight / (bound * bound)) * weight / (sigma * sigma);
+      const double w = tukey_weight(distance * std::sqrt(weight) / sigma, options_.tukey_c) * weight / (sigma * sigma);
       if (w == 0) continue;
       hessian.selfadjointView<Eigen::Lower>().rankUpdate(jacobian, w);
       gradient += w * distance * jacobian;
