@@ -82,6 +82,7 @@ int main(int argc, char** argv) {
     if (wait->count() > 0) options.wait_for_estimator_s = wait_for_estimator;
     if (!config.empty()) loc::load_rig(config);
     options.live = loc::is_live(source.kind);
+    options.check();  // before a device is touched
     // The source is made first and waits in the driver's run() only.
     loc::Driver* running = nullptr;
     source.gps.on_idle = [&running] {

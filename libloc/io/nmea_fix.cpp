@@ -143,7 +143,7 @@ bool NmeaFixAssembler::told_valid(const NmeaGga& gga) const {
 }
 
 void NmeaFixAssembler::label(const NmeaSentence& sentence) {
-  if (epoch_.labelled || !on_event_ || sentence.host_time_ns == kNoTime) return;
+  if (epoch_.labelled || sentence.host_time_ns == kNoTime) return;
   std::optional<CivilDate> date;
   if (const auto* rmc = std::get_if<NmeaRmc>(&sentence.content)) {
     if (!told_valid(*rmc)) return;
@@ -159,6 +159,7 @@ void NmeaFixAssembler::label(const NmeaSentence& sentence) {
   if (!gps) return;
   epoch_.labelled = true;
   ++counts_.labels;
+  if (!on_event_) return;
   on_event_({.kind = GpsTimeEvent::Kind::kLabel, .host_time_ns = sentence.host_time_ns, .gps_time_ns = *gps});
 }
 

@@ -7,6 +7,7 @@
 #ifdef LOC_HAVE_LIBGPS
 
 #include <gps.h>
+#include <sys/poll.h>
 
 #include <array>
 #include <cmath>
@@ -27,6 +28,7 @@ namespace {
 constexpr double kRadPerDeg = std::numbers::pi / 180;
 constexpr TimeNs kSecond = 1'000'000'000;
 constexpr int kPollUs = 100'000;
+constexpr int kPartialMs = 20;
 
 TimeNs to_ns(const timespec& t) {
   // gpsd's times are seconds since 1970; what does not fit is none.
@@ -172,14 +174,28 @@ class GpsdSource final : public MeasurementSource {
 
   std::optional<GpsMeasurement> read() {
     const TimeNs arrival = host_now();
-    if (::gps_read(data_.get(), nullptr, 0) < 0) {
+    // They keep what an earlier message has left.
+    data_->toff = {};
+    data_->pps = {};
+    const int size = ::gps_read(data_.get(), nullptr, 0);
+    if (size < 0) {
       disconnect();
       reconnection_.lost(name_, "gpsd has closed the connection");
       return std::nullopt;
     }
+    if (size == 0) {
+      // Half a message; until the rest comes, gps_waiting() returns at once and the flags are those of the last one.
+      pollfd event{data_->gps_fd, POLLIN, 0};
+      ::poll(&event, 1, kPartialMs);
+      return std::nullopt;
+    }
     const gps_data_t& d = *data_;
-    if ((d.set & TOFF_SET) != 0) time_event(GpsTimeEvent::Kind::kLabel, d.toff);
-    if ((d.set & PPS_SET) != 0) time_event(GpsTimeEvent::Kind::kPulse, d.pps);
+    // libgps 3.22 leaves what TOFF says in pps.
+    if ((d.set & TOFF_SET) != 0) {
+      time_event(GpsTimeEvent::Kind::kLabel, to_ns(d.toff.real) == kNoTime ? d.pps : d.toff);
+    } else if ((d.set & PPS_SET) != 0) {
+      time_event(GpsTimeEvent::Kind::kPulse, d.pps);
+    }
     if ((d.set & MODE_SET) == 0) return std::nullopt;
     last_fix_ns_ = steady_now();
     reconnection_.trouble("");
