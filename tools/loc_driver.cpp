@@ -9,6 +9,7 @@
 #include "tools/support/open_source.hpp"
 #include "tools/support/program.hpp"
 #include "tools/support/rig_option.hpp"
+#include "tools/support/time_base.hpp"
 
 namespace {
 
@@ -52,6 +53,7 @@ int main(int argc, char** argv) {
   std::string config;
   std::vector<std::string> channels;
   double wait_for_estimator = 0;
+  loc::TimeBaseWiring time_base;
   loc::Program program("loc-driver", "Publishes a recording on LCM, paced by its time stamps, or a GPS receiver live.");
   CLI::App& app = program.app();
   options.lcm_url.clear();
@@ -72,6 +74,7 @@ int main(int argc, char** argv) {
   app.add_option("--reconnect-timeout", options.reconnect_timeout_s, "Seconds without hub after which it gives up")
       ->capture_default_str();
   loc::add_channel_option(app, channels);
+  time_base.add_options(app);
   app.add_flag("--statistics", options.statistics, "Log and publish counters once per second");
 
   return program.run(argc, argv, [&] {
@@ -91,7 +94,8 @@ int main(int argc, char** argv) {
     source.gps.on_trouble = [&running](const std::string& text) {
       if (running != nullptr) running->set_trouble(text);
     };
-    loc::Driver driver(options, loc::open_source(source));
+    source.gps.on_time_event = [&time_base](const loc::GpsTimeEvent& event) { time_base.take(event); };
+    loc::Driver driver(options, time_base.wrap(loc::open_source(source), options.lcm_url, source.live()));
     running = &driver;
     spdlog::info("event=started source=\"{}\" speed={} url={}", options.source_name, speed, options.lcm_url);
     try {

@@ -163,6 +163,29 @@ WithGps with_gps(bool pulses, double duration_s = 200) {
   return w;
 }
 
+TEST(Restamp, device_time_stays_as_it_is_and_the_receiver_is_followed_all_the_same) {
+  WithGps w = with_gps(true, 60);
+  const auto original = w.imu.source->list;
+  ListSource* list = w.imu.source.get();
+  RestampOptions options = options_for(TimeBase::kDevice);
+  std::vector<clock_t> sent;
+  options.send = [&](const clock_t& message) { sent.push_back(message); };
+  RestampedSource source(std::move(w.imu.source), options);
+  std::size_t next = 0;
+  list->before = [&](const Measurement& m) {
+    for (; w.gps.events[next].host_time_ns < stamp_of(m).host_time_ns; ++next) source.take(w.gps.events[next]);
+  };
+  const auto out = test::read_all(source);
+  ASSERT_EQ(out.size(), original.size());
+  for (std::size_t i = 0; i < out.size(); ++i) EXPECT_EQ(stamp_of(out[i]).time_ns, stamp_of(original[i]).time_ns);
+  ASSERT_NEAR(static_cast<double>(sent.size()), 59, 4) << "once a second";
+  EXPECT_EQ(sent.front().quality, clock_t::QUALITY_LABELS);
+  EXPECT_EQ(sent.back().quality, clock_t::QUALITY_PULSES);
+  EXPECT_EQ(sent.back().input_clock, "host");
+  const ClockLine line = from_message(sent.back());
+  EXPECT_NEAR(static_cast<double>(line.convert(w.gps.host_time_ns[55]) - w.gps.gps_time_ns[55]), 0, 30'000);
+}
+
 TEST(Restamp, device_time_to_gps_time_by_pulses) {
   WithGps w = with_gps(true);
   ListSource* list = w.imu.source.get();
@@ -379,7 +402,6 @@ TEST(Restamp, options_are_checked) {
     change(options);
     EXPECT_THROW(RestampedSource(std::make_unique<ListSource>(), options), std::invalid_argument);
   };
-  refused([](auto& o) { o.base = TimeBase::kDevice; });
   refused([](auto& o) { o.wait_s = -1; });
   refused([](auto& o) { o.warm_up_s = std::nan(""); });
   refused([](auto& o) { o.pulse_wait_s = 1e300; });

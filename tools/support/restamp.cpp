@@ -35,7 +35,6 @@ void RestampOptions::check() const {
     require_not_negative(name, value);
     require(value <= 1e6, name, value, "must be at most 1e6");
   };
-  require(base != TimeBase::kDevice, "time base device: there is nothing to stamp anew");
   require_s("warm_up_s", warm_up_s);
   require_s("pulse_wait_s", pulse_wait_s);
   require_s("wait_s", wait_s);
@@ -48,6 +47,7 @@ RestampedSource::RestampedSource(std::unique_ptr<MeasurementSource> source, Rest
     : source_(std::move(source)), options_((options.check(), std::move(options))), gps_(options_.gps) {}
 
 std::optional<Measurement> RestampedSource::next() {
+  if (options_.base == TimeBase::kDevice) return as_it_is();
   for (;;) {
     while (!waiting_.empty()) {
       Waiting& first = waiting_.front();
@@ -90,6 +90,22 @@ std::optional<Measurement> RestampedSource::next() {
   }
 }
 
+std::optional<Measurement> RestampedSource::as_it_is() {
+  std::optional<Measurement> measurement = source_->next();
+  if (options_.poll) options_.poll();
+  const auto* fix = measurement ? std::get_if<GpsMeasurement>(&*measurement) : nullptr;
+  if (fix != nullptr) listen(*fix);
+  report();
+  return measurement;
+}
+
+// Fixes say the time, too, unless the receiver's own events say it better.
+void RestampedSource::listen(const GpsMeasurement& fix) {
+  newest_arrival_ns_ = std::max(newest_arrival_ns_, fix.host_time_ns);
+  if (own_events_ || fix.gps_time_ns == kNoTime || fix.host_time_ns == kNoTime) return;
+  follow({GpsTimeEvent::Kind::kLabel, fix.host_time_ns, fix.gps_time_ns});
+}
+
 void RestampedSource::accept(Measurement measurement) {
   const StreamKind kind = kind_of(measurement);
   const auto* image = std::get_if<ImageMeasurement>(&measurement);
@@ -106,10 +122,7 @@ void RestampedSource::accept(Measurement measurement) {
   Waiting waiting{std::move(measurement), id, 0, std::nullopt};
   const auto* fix = std::get_if<GpsMeasurement>(&waiting.measurement);
   if (fix != nullptr && fix->gps_time_ns != kNoTime) {
-    // Fixes say the time, too, unless the receiver's own events say it better.
-    if (!own_events_) {
-      follow({GpsTimeEvent::Kind::kLabel, fix->host_time_ns, fix->gps_time_ns});
-    }
+    listen(*fix);
   } else {
     stream.model.update(stamp_of(waiting.measurement).time_ns, stamp_of(waiting.measurement).host_time_ns);
     waiting.host = stream.model.convert_once(stamp_of(waiting.measurement).time_ns);
@@ -266,7 +279,7 @@ std::vector<ClockStatus> RestampedSource::status() const {
     const ClockLine& line = stream.model.line();
     add(name_of(id.first, id.second), "host", "samples", line, line.inverse().convert(newest_arrival_ns_));
   }
-  if (options_.base == TimeBase::kGps) {
+  if (options_.base == TimeBase::kGps || gps_since_ns_ != kNoTime) {
     if (const auto line = gps_.line()) {
       add("host", "gps", basis_name(gps_.basis()), *line, newest_arrival_ns_);
     } else if (other_) {
@@ -314,7 +327,7 @@ NamedCounts RestampedSource::counts() const {
   out.push_back({"clock.host_steps_back", sum.host_steps_back});
   out.push_back({"clock.gaps", sum.gaps});
   out.push_back({"clock.steps", steps});
-  if (options_.base == TimeBase::kGps) {
+  if (options_.base == TimeBase::kGps || gps_since_ns_ != kNoTime) {
     const GpsClockCounts& c = gps_.counts();
     out.push_back({"clock.pulses_used", c.pulses_used});
     out.push_back({"clock.pulses_spurious", c.pulses_spurious});

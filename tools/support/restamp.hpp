@@ -1,5 +1,5 @@
 // A source whose measurements are stamped on another clock: --time-base device|host|gps.
-//   device  as they are
+//   device  as they are; what a receiver says is still followed and sent to others
 //   host    when the host would have heard of them had nothing been in the way (sensors/clock), from the arrivals that
 //           the measurements carry (host_time_ns); every stream has a clock model of its own
 //   gps     that, and from host to GPS: by the time events and fixes of a receiver in the same program, or by what
@@ -97,7 +97,9 @@ class RestampedSource : public MeasurementSource {
   };
   enum class Outcome { kStamped, kWait, kNever };
 
+  std::optional<Measurement> as_it_is();
   void accept(Measurement measurement);
+  void listen(const GpsMeasurement& fix);
   Outcome stamp(Waiting& waiting);
   std::optional<ClockLine> host_to_gps(TimeNs host_ns) const;
   std::int64_t gps_epoch() const;

@@ -1,0 +1,41 @@
+// --time-base and what belongs to it: wires a source, a receiver's time events and LOC_CLOCK together (see
+// restamp.hpp).
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "libloc/io/source.hpp"
+#include "libloc/sensors/gps_time_event.hpp"
+#include "tools/support/clock_link.hpp"
+#include "tools/support/restamp.hpp"
+
+namespace loc {
+
+class TimeBaseWiring {
+ public:
+  void add_options(CLI::App& app);
+
+  /// The source in the time base that was asked for; as it is where there is nothing to do.
+  /// @param receiver it is a GPS receiver: it publishes LOC_CLOCK, in any base.
+  /// @throws UsageError for an option that is wrong; as open_lcm.
+  std::unique_ptr<MeasurementSource> wrap(std::unique_ptr<MeasurementSource> source, const std::string& lcm_url,
+                                          bool receiver);
+  /// For the receiver's handler of time events.
+  void take(const GpsTimeEvent& event) {
+    if (source_ != nullptr) source_->take(event);
+  }
+
+ private:
+  std::string base_ = "device";
+  std::string pulse_label_ = "previous";
+  double wait_s_ = RestampOptions{}.wait_s;
+  double label_delay_s_ = to_seconds(GpsClockOptions{}.label_delay_ns);
+  double sigma_label_delay_s_ = to_seconds(GpsClockOptions{}.sigma_label_delay_ns);
+  RestampedSource* source_ = nullptr;  // lives in the driver
+  std::optional<ClockLink> link_;
+};
+
+}  // namespace loc
