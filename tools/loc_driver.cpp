@@ -95,7 +95,7 @@ int main(int argc, char** argv) {
       if (running != nullptr) running->set_trouble(text);
     };
     source.gps.on_time_event = [&time_base](const loc::GpsTimeEvent& event) { time_base.take(event); };
-    loc::Driver driver(options, time_base.wrap(loc::open_source(source), options.lcm_url, source.live()));
+    loc::Driver driver(options, time_base.wrap(loc::open_source(source), options.lcm_url, loc::is_live(source.kind)));
     running = &driver;
     spdlog::info("event=started source=\"{}\" speed={} url={}", options.source_name, speed, options.lcm_url);
     try {

@@ -465,7 +465,15 @@ TriadCalibration aligned(const TriadCalibration& magnetometer, const Magnetomete
     for (const std::string& reason : alignment.quality.reasons) text += "; " + reason;
     throw DataError(text);
   }
-  return {.bias = magnetometer.bias, .matrix = alignment.matrix * magnetometer.matrix};
+  TriadCalibration out = magnetometer;
+  out.matrix = alignment.matrix * magnetometer.matrix;
+  if (out.quality) {
+    TriadQuality& q = *out.quality;
+    q.matrix_sigma = (alignment.matrix.cwiseAbs2() * q.matrix_sigma.cwiseAbs2()).cwiseSqrt();
+    q.verdict = std::max(q.verdict, alignment.quality.verdict);
+    q.reasons.insert(q.reasons.end(), alignment.quality.reasons.begin(), alignment.quality.reasons.end());
+  }
+  return out;
 }
 
 }  // namespace loc
