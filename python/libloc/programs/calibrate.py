@@ -22,7 +22,13 @@ import numpy as np
 
 import libloc
 from libloc import DataError, Verdict
-from libloc.programs import calibrate_input, calibrate_live, calibrate_magnetometer
+from libloc.programs import (
+    calibrate_inertial,
+    calibrate_input,
+    calibrate_live,
+    calibrate_magnetometer,
+    calibrate_noise,
+)
 from libloc.programs.calibrate_input import InputOptions, Readings
 from libloc.programs.calibrate_report import Outcome, text_of, write_report
 
@@ -95,6 +101,19 @@ def make_parser() -> argparse.ArgumentParser:
     _add_input_options(magnetometer, files="*")
     calibrate_magnetometer.add_options(magnetometer)
     _add_output_options(magnetometer)
+    for name, text in (
+        ("accelerometer", "bias, scale and cross-axis, from still poses"),
+        ("gyroscope", "bias at rest; scale and alignment, from turns between still poses"),
+    ):
+        command = _add_command(commands, name, text, calibrate_inertial.__doc__ or "")
+        _add_input_options(command)
+        calibrate_inertial.add_options(command)
+        _add_output_options(command)
+    noise = _add_command(
+        commands, "imu-noise", "noise densities and random walks, from rest", calibrate_noise.__doc__ or ""
+    )
+    _add_input_options(noise)
+    _add_output_options(noise)
     return parser
 
 
@@ -112,6 +131,9 @@ def _input_options(options: argparse.Namespace) -> InputOptions:
 # What a table without names holds, and who calibrates it.
 _COMMANDS: dict[str, tuple[str, Callable[[Readings, argparse.Namespace], Outcome]]] = {
     "magnetometer": ("magnetometer", calibrate_magnetometer.calibrate),
+    "accelerometer": ("accelerometer", calibrate_inertial.calibrate_accelerometer),
+    "gyroscope": ("gyroscope", calibrate_inertial.calibrate_gyroscope),
+    "imu-noise": ("gyroscope", calibrate_noise.calibrate),
 }
 
 
@@ -159,6 +181,8 @@ def main(arguments: list[str] | None = None) -> int:
         parser.error(f"--out {options.out}: is a folder, not a file")
     if options.command == "magnetometer":
         calibrate_magnetometer.check_options(parser, options)
+    elif options.command in ("accelerometer", "gyroscope"):
+        calibrate_inertial.check_options(parser, options)
     try:
         if options.out is not None and options.out.exists():
             libloc.read_rig(options.out)  # before the work, not after it

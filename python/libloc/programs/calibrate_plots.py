@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 # Colours that colour-blind readers tell apart, too.
@@ -36,12 +37,14 @@ def _cloud(
     axes: Any, rows: NDArray[np.float64], surface: NDArray[np.float64], colour: str, title: str, unit: str
 ) -> None:
     axes.plot_wireframe(*np.moveaxis(surface, -1, 0), color=SURFACE, lw=0.4, rstride=2, cstride=2)
-    axes.scatter(*rows.T, s=2, color=colour, alpha=0.6, depthshade=False)
+    few = len(rows) < 200
+    axes.scatter(*rows.T, s=20 if few else 2, color=colour, alpha=1.0 if few else 0.6, depthshade=False)
     low, high = surface.reshape(-1, 3).min(axis=0), surface.reshape(-1, 3).max(axis=0)
     reach = 0.55 * float((high - low).max())
     for name, centre in zip("xyz", (low + high) / 2, strict=True):
         getattr(axes, f"set_{name}lim")(centre - reach, centre + reach)
-        getattr(axes, f"set_{name}label")(f"{name} [{unit}]")
+        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=8)
+        getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(5))
     axes.set_box_aspect((1, 1, 1))
     axes.set_title(title)
 
