@@ -12,6 +12,7 @@ PYBIND11_MODULE(_core, m) {
   locpy::bind_sensors(m);
   locpy::bind_estimators(m);
   locpy::bind_ellipsoid(m);
+  locpy::bind_clock(m);
   locpy::bind_eval(m);
   locpy::bind_io(m);
   locpy::bind_msgs(m);
