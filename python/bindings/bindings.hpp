@@ -13,6 +13,7 @@ void bind_ellipsoid(pybind11::module_& m);
 void bind_clock(pybind11::module_& m);
 void bind_eval(pybind11::module_& m);
 void bind_io(pybind11::module_& m);
+void bind_nmea(pybind11::module_& m);
 void bind_msgs(pybind11::module_& m);
 
 }  // namespace locpy

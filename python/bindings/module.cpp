@@ -15,5 +15,6 @@ PYBIND11_MODULE(_core, m) {
   locpy::bind_clock(m);
   locpy::bind_eval(m);
   locpy::bind_io(m);
+  locpy::bind_nmea(m);
   locpy::bind_msgs(m);
 }

@@ -1,7 +1,8 @@
-"""Opens a recording by what the file is: EuRoC folder, BROAD trial, CSV, LCM log."""
+"""Opens a recording by what the file is: EuRoC folder, BROAD trial, CSV, LCM log, NMEA log."""
 
 from __future__ import annotations
 
+import re
 from os import PathLike
 from pathlib import Path
 
@@ -13,13 +14,15 @@ from libloc._core import (
     open_csv,
     open_euroc,
     open_lcm_log,
+    open_nmea,
 )
 
 _LCM_EVENT = bytes.fromhex("eda1da01")
+_NMEA_SENTENCE = re.compile(rb"\$[A-Z]{5},[ -#%-)+-~]*\*[0-9A-Fa-f]{2}")
 
 
 def file_format(path: str | PathLike[str]) -> str:
-    """One of euroc (a folder), broad (MATLAB v5), lcm (LCM log), csv, tum: by the content, not the name.
+    """One of euroc (a folder), broad (MATLAB v5), lcm (LCM log), nmea, csv, tum: by content, not name.
 
     Raises DataError when the path does not exist, is empty, or is nothing of this.
     """
@@ -36,8 +39,10 @@ def file_format(path: str | PathLike[str]) -> str:
         return "lcm"
     if head.startswith(b"MATLAB 5.0"):
         return "broad"
+    if _NMEA_SENTENCE.search(head):
+        return "nmea"
     if b"\0" in head:
-        raise DataError(f"{path}: neither an LCM log nor a MATLAB v5 file, CSV or TUM trajectory")
+        raise DataError(f"{path}: neither an LCM log nor a MATLAB v5 file, NMEA log, CSV or TUM trajectory")
     lines = [line.strip() for line in head.splitlines()]
     data = [line for line in lines if line and not line.startswith(b"#")]
     # A CSV heading may be a comment line, a TUM file's comments may hold commas: the data tell.
@@ -52,7 +57,14 @@ def open_recording(path: str | PathLike[str]) -> MeasurementSource:
     form = file_format(path)
     if form == "tum":
         raise DataError(f"{path}: a TUM trajectory holds no measurements; read it with libloc.read_tum")
-    return {"euroc": open_euroc, "broad": open_broad, "csv": open_csv, "lcm": open_lcm_log}[form](Path(path))
+    openers = {
+        "euroc": open_euroc,
+        "broad": open_broad,
+        "csv": open_csv,
+        "lcm": open_lcm_log,
+        "nmea": open_nmea,
+    }
+    return openers[form](Path(path))
 
 
 def read_recording(path: str | PathLike[str]) -> Recording:
