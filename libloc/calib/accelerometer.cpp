@@ -439,6 +439,17 @@ AccelerometerFit fit_accelerometer(std::span<const StillPose> poses, const Accel
   out.distinct_poses = count_distinct(scaled, p, use, options.distinct_angle, fits);
   if (!out.converged) out.quality.lower_to(Verdict::kWarn, "The fit did not converge: look at the residuals.");
   judge(out, options, out.quality);
+  TriadQuality& q = out.triad.quality.emplace();
+  q.verdict = out.quality.verdict;
+  q.reasons = out.quality.reasons;
+  q.method = "still-poses";
+  q.samples = out.inliers;
+  q.residual_rms = out.residual_rms / options.gravity;
+  if (dof >= 1) {
+    const Vector9d sigma = out.cov.diagonal().cwiseSqrt();
+    q.bias_sigma = sigma.head<3>();
+    q.matrix_sigma = symmetric(sigma);
+  }
   return out;
 }
 

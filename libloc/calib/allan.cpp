@@ -343,7 +343,7 @@ ImuAllan analyse_imu_noise(std::span<const TimeNs> times_ns, const TriadRows& gy
 
 ImuNoiseFit imu_noise_from(const ImuAllan& allan, const ImuNoise& fallback) {
   fallback.check();
-  ImuNoiseFit out{.noise = fallback, .quality = {}};
+  ImuNoiseFit out{.noise = fallback, .measured = {}, .quality = {}};
   const auto take = [&](const std::array<AllanFit, 3>& axes, bool present, AllanTerm AllanFit::*term,
                         const std::string& name, Verdict missing, double& field) {
     if (!present) {
@@ -363,6 +363,7 @@ ImuNoiseFit imu_noise_from(const ImuAllan& allan, const ImuNoise& fallback) {
     }
     if (identified > 0) {
       field = std::sqrt(square / identified);
+      out.measured.push_back(name);
       if (identified < 3) {
         out.quality.lower_to(Verdict::kFair, name + " was identified on " + std::to_string(identified) + " of 3 axes.");
       }

@@ -87,7 +87,8 @@ ImuAllan analyse_imu_noise(std::span<const TimeNs> times_ns, const TriadRows& gy
 
 struct ImuNoiseFit {
   ImuNoise noise;
-  Quality quality;  ///< says of every field that was not measured where its value is from
+  std::vector<std::string> measured;  ///< names of the fields of noise that the recording determines
+  Quality quality;                    ///< says of every field that was not measured where its value is from
 };
 
 /// Noise for the estimators: root mean square over the axes. What was not identified keeps the fallback's value, or the

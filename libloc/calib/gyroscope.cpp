@@ -299,6 +299,21 @@ void judge_bias(std::span<const StillSegment> segments, GyroscopeFit& fit) {
   }
 }
 
+/// For the rig.
+GyroscopeFit with_quality(GyroscopeFit fit) {
+  TriadQuality& q = fit.triad.quality.emplace();
+  q.verdict = fit.quality.verdict;
+  q.reasons = fit.quality.reasons;
+  q.method = fit.matrix_known ? "still-turns" : "rest-bias";
+  q.samples = fit.matrix_known ? fit.inliers : fit.segments;
+  q.bias_sigma = fit.bias_cov.diagonal().cwiseSqrt();
+  if (fit.matrix_known) {
+    const Vector9d sigma = fit.cov.diagonal().cwiseSqrt();
+    q.matrix_sigma = from_rows(sigma);
+  }
+  return fit;
+}
+
 std::string percent(double share) {
   return to_text(std::round(share * 1e5) / 1e3) + " %";
 }
@@ -395,7 +410,8 @@ GyroscopeFit fit_gyroscope_bias(std::span<const StillSegment> segments) {
   }
   judge_bias(good, fit);
   fit.quality.lower_to(Verdict::kFair, "Bias only: scale and misalignment are not known and stay as they are.");
-  return fit;
+  fit.segments = static_cast<int>(good.size());
+  return with_quality(std::move(fit));
 }
 
 GyroscopeFit fit_gyroscope(std::span<const TimeNs> times_ns, const TriadRows& gyroscope,
@@ -414,7 +430,7 @@ GyroscopeFit fit_gyroscope(std::span<const TimeNs> times_ns, const TriadRows& gy
   GyroscopeFit fit = fit_gyroscope_bias(segments);
   const auto bias_only = [&](const std::string& reason) {
     fit.quality.reasons.push_back(reason);
-    return fit;
+    return with_quality(fit);
   };
   if (!fit.bias_known) return fit;
   const bool usable = std::all_of(segments.begin(), segments.end(), [](const StillSegment& s) {
@@ -531,7 +547,7 @@ GyroscopeFit fit_gyroscope(std::span<const TimeNs> times_ns, const TriadRows& gy
                                          " deg: axes are swapped. The matrix corrects it.");
   }
   fit.quality = quality;
-  return fit;
+  return with_quality(std::move(fit));
 }
 
 }  // namespace loc

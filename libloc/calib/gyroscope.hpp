@@ -62,6 +62,7 @@ struct GyroscopeFit {
   double rotation_angle = kUnknown;  ///< [rad] between the gyroscope's and the accelerometer's axes
   bool left_handed = false;          ///< an axis has the opposite sign
   bool converged = false;
+  int segments = 0;  ///< still ones, that the bias is from
   std::vector<GyroscopeTurn> turns;
   int inliers = 0;
   Quality quality;

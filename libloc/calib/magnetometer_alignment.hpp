@@ -84,7 +84,8 @@ MagnetometerAlignment align_magnetometer(std::span<const TimeNs> times_ns, const
                                          const TriadRows& accelerometer, const TriadRows& magnetometer,
                                          const MagnetometerAlignmentOptions& options = {});
 
-/// The calibration followed by the alignment, for the rig. @throws DataError with the reasons unless solved.
+/// The calibration followed by the alignment, for the rig; its quality is the worse of both. @throws DataError with the
+/// reasons unless solved.
 TriadCalibration aligned(const TriadCalibration& magnetometer, const MagnetometerAlignment& alignment);
 
 /// One interval between two readings of the field, for align_magnetometer and its test.

@@ -13,6 +13,7 @@ PYBIND11_MODULE(_core, m) {
   locpy::bind_estimators(m);
   locpy::bind_ellipsoid(m);
   locpy::bind_clock(m);
+  locpy::bind_calib_inertial(m);
   locpy::bind_eval(m);
   locpy::bind_io(m);
   locpy::bind_nmea(m);

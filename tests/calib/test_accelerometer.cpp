@@ -71,6 +71,9 @@ TEST(Accelerometer, ExactPosesGiveTheTruthEightRadiiOff) {
   EXPECT_LT((fit.triad.matrix - truth.matrix).norm(), 1e-9);
   EXPECT_LT(fit.residual_rms, 1e-6);
   EXPECT_EQ(fit.inliers, 30);
+  ASSERT_TRUE(fit.triad.quality.has_value());
+  EXPECT_EQ(fit.triad.quality->method, "still-poses");
+  EXPECT_EQ(fit.triad.quality->samples, 30);
 }
 
 // Only the symmetric part is observable: a rotated sensor gives the symmetric factor of its matrix.

@@ -224,6 +224,9 @@ TEST(ImuAllan, NoiseForTheEstimators) {
   // No walk in the gyroscope: the default stays, as it is within what the recording allows, or the bound is taken.
   EXPECT_LE(fit.noise.gyroscope_random_walk, 2e-5);
   EXPECT_EQ(fit.noise.gyroscope_bias_sigma, ImuNoise{}.gyroscope_bias_sigma);
+  const std::vector<std::string> measured = {"gyroscope_noise_density", "accelerometer_noise_density",
+                                             "accelerometer_random_walk"};
+  EXPECT_EQ(fit.measured, measured);
   EXPECT_EQ(fit.quality.verdict, Verdict::kFair);
   ASSERT_FALSE(fit.quality.reasons.empty());
   EXPECT_NE(fit.quality.reasons[0].find("gyroscope_random_walk"), std::string::npos);

@@ -220,6 +220,10 @@ TEST(Gyroscope, BiasAlone) {
   EXPECT_FALSE(same.matrix_known);
   EXPECT_EQ(same.triad.bias, fit.triad.bias);
   EXPECT_EQ(same.quality.reasons.size(), 2U);
+  ASSERT_TRUE(same.triad.quality.has_value());
+  EXPECT_EQ(same.triad.quality->method, "rest-bias");
+  EXPECT_EQ(same.triad.quality->reasons, same.quality.reasons);
+  EXPECT_EQ(same.triad.quality->samples, 1);
 }
 
 TEST(Gyroscope, DriftIsReported) {

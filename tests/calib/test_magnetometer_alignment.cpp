@@ -213,10 +213,16 @@ TEST(MagnetometerAlignment, HostileInput) {
 }
 
 TEST(MagnetometerAlignment, GoesIntoTheRig) {
-  TriadCalibration triad{.bias = {1, 2, 3}, .matrix = 2 * Eigen::Matrix3d::Identity()};
+  TriadCalibration triad;
+  triad.bias = {1, 2, 3};
+  triad.matrix = 2 * Eigen::Matrix3d::Identity();
+  triad.quality.emplace().matrix_sigma = Eigen::Vector3d(1, 2, 3).asDiagonal();
   MagnetometerAlignment a;
   a.solved = true;
   a.matrix = so3::exp({0, 0, std::numbers::pi / 2}).toRotationMatrix();
+  a.quality.lower_to(Verdict::kWarn, "because");
+  EXPECT_EQ(aligned(triad, a).quality->verdict, Verdict::kWarn);
+  EXPECT_NEAR(aligned(triad, a).quality->matrix_sigma(0, 1), 2, 1e-12);
   EXPECT_TRUE(test::near(aligned(triad, a).apply({2, 2, 3}), Eigen::Vector3d(0, 2, 0), 1e-12));
 }
 
