@@ -1,5 +1,6 @@
 #include "libloc/io/nmea_fields.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -25,10 +26,7 @@ bool is_digit(char c) {
 }
 
 bool all_digits(std::string_view text) {
-  for (const char c : text) {
-    if (!is_digit(c)) return false;
-  }
-  return true;
+  return std::all_of(text.begin(), text.end(), is_digit);
 }
 
 /// Value of digits only. @param text at most 18 of them

@@ -61,8 +61,8 @@ void NmeaFixOptions::check() const {
   require_not_negative("sigma_per_dop", sigma_per_dop);
 }
 
-NmeaFixAssembler::NmeaFixAssembler(NmeaFixOptions options, GpsTimeEventHandler on_event)
-    : options_((options.check(), std::move(options))), on_event_(std::move(on_event)) {}
+NmeaFixAssembler::NmeaFixAssembler(const NmeaFixOptions& options, GpsTimeEventHandler on_event)
+    : options_((options.check(), options)), on_event_(std::move(on_event)) {}
 
 std::optional<GpsMeasurement> NmeaFixAssembler::process(const NmeaSentence& sentence) {
   std::optional<GpsMeasurement> fix;
@@ -299,12 +299,11 @@ void NmeaFixAssembler::find_time(const Epoch& epoch, bool valid, GpsMeasurement&
   last_time_of_day_ns_ = epoch.time_of_day_ns;
   last_host_time_ns_ = epoch.host_time_ns;
   if (!options_.leap_seconds.known_on(*date)) ++counts_.past_leap_table;
-  if (from_zda && *from_zda != epoch.zda->date) {
-    ++counts_.rollover_mended;
-  } else if (from_rmc && (from_rmc->month != epoch.rmc->date.month || from_rmc->day != epoch.rmc->date.day)) {
-    // 7168 days are no whole number of years.
-    ++counts_.rollover_mended;
-  }
+  // 7168 days are no whole number of years: RMC's day and month tell, too.
+  const bool zda_mended = from_zda && *from_zda != epoch.zda->date;
+  const bool rmc_mended =
+      from_rmc && (from_rmc->month != epoch.rmc->date.month || from_rmc->day != epoch.rmc->date.day);
+  if (zda_mended || rmc_mended) ++counts_.rollover_mended;
 }
 
 void NmeaFixAssembler::fill_position(const Epoch& epoch, GpsMeasurement& fix) const {

@@ -46,7 +46,7 @@ class NmeaFixAssembler {
   /// @param on_event gets a label for the first sentence of an epoch that tells a valid date and time, if its arrival
   /// is known. RMC says itself whether it is valid; ZDA is believed in epochs that have a fix so far, and after them.
   /// @throws as NmeaFixOptions::check
-  explicit NmeaFixAssembler(NmeaFixOptions options = {}, GpsTimeEventHandler on_event = {});
+  explicit NmeaFixAssembler(const NmeaFixOptions& options = {}, GpsTimeEventHandler on_event = {});
 
   /// @return the fix of the epoch before, when this sentence begins another. time_ns and sequence are left to the
   /// caller; host_time_ns is the arrival of the epoch's first sentence; gps_time_ns that of validity, known when the

@@ -98,7 +98,6 @@ void def_with_options(py::module_& m, const char* name, auto function, const cha
 }
 
 void bind_time(py::module_& m) {
-  m.attr("NO_TIME") = loc::kNoTime;
   m.def(
       "gps_from_unix",
       [](loc::TimeNs unix_time_ns, std::optional<int> leap_seconds) {
