@@ -23,6 +23,7 @@ import numpy as np
 import libloc
 from libloc import DataError, Verdict
 from libloc.programs import (
+    calibrate_clock,
     calibrate_inertial,
     calibrate_input,
     calibrate_live,
@@ -114,6 +115,12 @@ def make_parser() -> argparse.ArgumentParser:
     )
     _add_input_options(noise)
     _add_output_options(noise)
+    clock = _add_command(
+        commands, "clock", "skew and jitter of the clock that stamps a stream", calibrate_clock.__doc__ or ""
+    )
+    _add_input_options(clock)
+    calibrate_clock.add_options(clock)
+    _add_output_options(clock)
     return parser
 
 
@@ -151,6 +158,13 @@ def read_inputs(options: argparse.Namespace) -> Readings:
     return readings
 
 
+def calibrated(options: argparse.Namespace) -> Outcome:
+    """Reads and calibrates. Raises DataError (ValueError) for data that cannot be calibrated."""
+    if options.command == "clock":
+        return calibrate_clock.calibrate(options, _input_options(options))
+    return _COMMANDS[options.command][1](read_inputs(options), options)
+
+
 def finish(outcome: Outcome, options: argparse.Namespace, command: list[str]) -> int:
     """Prints, writes the rig and the report. Returns the exit code."""
     print(text_of(outcome))
@@ -186,7 +200,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         if options.out is not None and options.out.exists():
             libloc.read_rig(options.out)  # before the work, not after it
-        outcome = _COMMANDS[options.command][1](read_inputs(options), options)
+        outcome = calibrated(options)
         return finish(outcome, options, command)
     except KeyboardInterrupt:
         print("loc-calibrate: interrupted, nothing was written", file=sys.stderr)

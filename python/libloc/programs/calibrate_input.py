@@ -182,12 +182,14 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _time_ns(text: str, unit: str) -> int:
-    """Exact: a float of seconds since 1970 is not."""
-    exponent = TIME_UNITS[unit]
-    ns = int((Decimal(text) * 10**exponent).to_integral_value())
+def _parse_time(text: str, unit: str, where: str) -> int:
+    """Nanoseconds, exact: a float of seconds since 1970 is not. Raises DataError."""
+    try:
+        ns = int((Decimal(text) * 10 ** TIME_UNITS[unit]).to_integral_value())
+    except (InvalidOperation, ValueError, OverflowError):
+        raise DataError(f"{where}: '{text}' is no time in {unit}") from None
     if not -(2**63) < ns < 2**63:
-        raise ValueError("out of range")
+        raise DataError(f"{where}: '{text}' is no time in {unit}: out of range")
     return ns
 
 
@@ -229,12 +231,7 @@ def _read_table(path: Path, columns: list[_Column], heading: bool, options: Inpu
                 raise DataError(f"{path}:{number}: {len(cells)} cells, not {width}")
             time = 0
             if time_at is not None:
-                try:
-                    time = _time_ns(cells[time_at], time_unit)
-                except (InvalidOperation, ValueError, OverflowError):
-                    raise DataError(
-                        f"{path}:{number}: '{cells[time_at]}' is no time in {time_unit}"
-                    ) from None
+                time = _parse_time(cells[time_at], time_unit, f"{path}:{number}")
             for triad, at in places.items():
                 texts = [cells[i] for i in at]
                 if not any(texts):
@@ -333,6 +330,54 @@ def read_readings(path: Path, sensor: str, options: InputOptions) -> Readings:
     if options.columns is not None:
         raise DataError(f"{path}: --columns is for text files; this is {form}")
     return _of_recording(path, libloc.open_recording(path), form)
+
+
+def read_stamps_table(
+    path: Path, options: InputOptions
+) -> tuple[NDArray[np.int64], NDArray[np.int64], dict[str, int]]:
+    """Two columns of times: of the device and of the arrival at the host, both [ns]. Unit in the names: device_us.
+
+    Raises DataError naming file, line and value.
+    """
+    with path.open(encoding="utf-8", errors="replace") as file:
+        first = _cells(file.readline().strip().lstrip("#").strip())
+    heading = not all(_is_number(cell) for cell in first)
+    names = options.columns.split(",") if options.columns else first
+    if not heading and not options.columns:
+        raise DataError(f"{path}: the first line is numbers: name the columns, --columns device_ns,host_ns")
+    at: dict[str, tuple[int, str]] = {}
+    for i, name in enumerate(names):
+        kind, _, unit = name.strip().partition("_")
+        unit = unit or options.time_unit or ""
+        if kind in ("device", "host") and kind not in at:
+            if unit not in TIME_UNITS:
+                raise DataError(
+                    f"{path}: column '{name}': give its unit, one of {', '.join(TIME_UNITS)}: {kind}_ns"
+                )
+            at[kind] = (i, unit)
+        elif name.strip() != "-":
+            raise DataError(
+                f"{path}: column '{name.strip()}' is not known; known are device_ns, host_ns, and -"
+            )
+    if len(at) != 2:
+        raise DataError(f"{path}: a column of the device's times and one of the host's are needed")
+    times: dict[str, list[int]] = {kind: [] for kind in at}
+    counts: dict[str, int] = {}
+    with path.open(encoding="utf-8", errors="replace", newline=None) as file:
+        for number, line in enumerate(file, start=1):
+            text = line.strip()
+            if (number == 1 and heading) or not text or text.startswith("#"):
+                continue
+            if not line.endswith("\n"):
+                counts["rows.skipped.no_line_end"] = 1
+                break
+            cells = _cells(text)
+            if len(cells) != len(names):
+                raise DataError(f"{path}:{number}: {len(cells)} cells, not {len(names)}")
+            for kind, (i, unit) in at.items():
+                times[kind].append(_parse_time(cells[i], unit, f"{path}:{number}"))
+    counts["rows.read"] = len(times["host"])
+    return np.array(times["device"], dtype=np.int64), np.array(times["host"], dtype=np.int64), counts
 
 
 def merged(readings: Readings, more: Readings) -> Readings:
