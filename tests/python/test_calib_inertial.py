@@ -195,13 +195,13 @@ def overlapping_allan(x, m):
 
 def test_allan_is_the_definition():
     rng = np.random.default_rng(3)
-    x = 0.1 * rng.standard_normal(5000) + 1e-3 * np.cumsum(rng.standard_normal(5000))
+    x = 0.1 * rng.standard_normal(5000) + 5e-3 * np.cumsum(rng.standard_normal(5000))
     fit = libloc.allan_fit(x, 50.0)
     expected = [overlapping_allan(x, round(t * 50)) for t in fit.tau_s]
     assert np.allclose(fit.deviation, expected, rtol=1e-9)
     assert fit.noise_density.identified
-    assert fit.noise_density.value == pytest.approx(0.1 / np.sqrt(50), rel=0.05)
-    assert fit.random_walk.value == pytest.approx(1e-3 * np.sqrt(50), rel=0.4)
+    assert fit.noise_density.value == pytest.approx(0.1 / np.sqrt(50), rel=0.1)
+    assert fit.random_walk.value == pytest.approx(5e-3 * np.sqrt(50), rel=0.4)
 
 
 def test_allan_against_allantools():
