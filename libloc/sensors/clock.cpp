@@ -57,7 +57,7 @@ void ClockModel::reset() {
 
 // Above the line [ns].
 double ClockModel::lateness_ns(const Sample& sample) const {
-  const double passed = static_cast<double>(saturating_difference(sample.device_ns, line_.input_ref_ns));
+  const auto passed = static_cast<double>(saturating_difference(sample.device_ns, line_.input_ref_ns));
   const TimeNs host = saturating_difference(sample.host_ns, line_.output_ref_ns);
   const TimeNs device = saturating_difference(sample.device_ns, line_.input_ref_ns);
   return static_cast<double>(saturating_difference(host, device)) - line_.skew * passed;
@@ -133,8 +133,8 @@ bool ClockModel::set_aside(const Sample& sample, Doubt doubt) {
 
 // What the run was is told by its first sample: which of the two clocks did not go on as it used to.
 void ClockModel::start_anew() {
-  const double device = static_cast<double>(saturating_difference(aside_first_.device_ns, last_.device_ns));
-  const double host = static_cast<double>(saturating_difference(aside_first_.host_ns, last_.host_ns));
+  const auto device = static_cast<double>(saturating_difference(aside_first_.device_ns, last_.device_ns));
+  const auto host = static_cast<double>(saturating_difference(aside_first_.host_ns, last_.host_ns));
   bool host_back = false;
   if (doubt_ == Doubt::kDeviceBack) {
     ++counts_.device_resets;
