@@ -5,6 +5,7 @@
 #include <numeric>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "libloc/core/check.hpp"
 #include "libloc/core/statistics.hpp"
@@ -142,12 +143,14 @@ std::optional<RestNoise> rest_noise(const TriadRows& values, const Usable& usabl
   for (int axis = 0; axis < 3; ++axis) {
     if (noise.quantum[axis] == 0) continue;  // never changes
     std::vector<double> variances;
+    variances.reserve(windows.size());
     for (const WindowVariance& w : windows) variances.push_back(w.variance[axis] + rounding[axis]);
     scale[axis] = quantile(variances, 0.05);
   }
   noise.variance = scale;
   if (!noise.known()) return noise;
   std::vector<double> logs;
+  logs.reserve(windows.size());
   for (const WindowVariance& w : windows) logs.push_back(std::log(noise.activity(w.variance)));
   const double mode = lowest_mode(logs, least);
   std::vector<double> whiteness;
@@ -160,24 +163,37 @@ std::optional<RestNoise> rest_noise(const TriadRows& values, const Usable& usabl
   return noise;
 }
 
-/// Activity at each usable row: of the window around it, the nearest whole one at the ends of a block; infinite in
-/// blocks shorter than a window. The larger of the sensors counts.
-void raise_activity(const TriadRows& values, const RestNoise& noise, const Usable& usable, int window,
-                    std::vector<double>& activity) {
+/// What is looked at for each usable row; of the sensors the larger value counts.
+struct Motion {
+  /// Of the window around the row, the nearest whole one at the ends of a block; infinite in blocks shorter than a
+  /// window.
+  std::vector<double> activity;
+  std::vector<double> wander;  ///< between the windows before and after the row; 0 where one of them is not whole
+};
+
+void raise_activity(const TriadRows& values, const RestNoise& noise, const Usable& usable, int window, Motion& motion) {
   SlidingMoments moments(window);
+  std::vector<Eigen::Vector3d> means;  // of the windows that end at each row
   const auto size = static_cast<std::size_t>(window);
   for (std::size_t block = 0; block + 1 < usable.cuts.size(); ++block) {
     const std::size_t begin = usable.cuts[block];
     const std::size_t end = usable.cuts[block + 1];
-    const auto raise = [&](std::size_t k, double value) { activity[k] = std::max(activity[k], value); };
+    const auto raise = [&](std::size_t k, double value) { motion.activity[k] = std::max(motion.activity[k], value); };
     if (end - begin < size) {
       for (std::size_t k = begin; k < end; ++k) raise(k, std::numeric_limits<double>::infinity());
       continue;
     }
     moments.reset();
+    means.clear();
     for (std::size_t k = begin; k < end; ++k) {
       moments.push(values.row(usable.rows[k]));
       if (k + 1 < begin + size) continue;
+      means.push_back(moments.mean());
+      if (means.size() > size) {
+        const double step = noise.wander(means.back() - means[means.size() - 1 - size], window);
+        double& at = motion.wander[k + 1 - size];
+        at = std::max(at, std::isnan(step) ? HUGE_VAL : step);
+      }
       const double value = noise.activity(moments.variance());
       const std::size_t centre = k + 1 - size + size / 2;
       const std::size_t from = k + 1 == begin + size ? begin : centre;
@@ -185,6 +201,37 @@ void raise_activity(const TriadRows& values, const RestNoise& noise, const Usabl
       for (std::size_t at = from; at < to; ++at) raise(at, std::isnan(value) ? HUGE_VAL : value);
     }
   }
+}
+
+/// Cuts what is quiet, rows [from, to) of usable, where its mean wanders, and keeps what is long and calm enough.
+void cut_where_it_wanders(std::size_t from, std::size_t to, const Motion& motion, std::size_t window, double limit,
+                          std::vector<std::pair<std::size_t, std::size_t>>& kept, std::int64_t& left_out) {
+  if (limit == 0 || to - from < 2 * window) {
+    kept.emplace_back(from, to);
+    return;
+  }
+  constexpr double kSingle = 5;  // times the limit of the mean: one step alone
+  // Only windows that are inside: at the ends they see the motion before and after.
+  const std::size_t last = to - window;
+  std::size_t start = from;
+  const auto close = [&](std::size_t end) {
+    double sum = 0;
+    double count = 0;
+    for (std::size_t k = start + window; k + window <= end; ++k, ++count) sum += motion.wander[k];
+    if (count > 0 && sum > limit * count) {
+      ++left_out;
+    } else if (end > start) {
+      kept.emplace_back(start, end);
+    }
+  };
+  for (std::size_t k = from + window; k <= last; ++k) {
+    if (motion.wander[k] <= kSingle * limit) continue;
+    close(k);
+    ++left_out;
+    while (k <= last && motion.wander[k] > kSingle * limit) ++k;
+    start = k;
+  }
+  close(to);
 }
 
 StillStatistics statistics(const TriadRows& values, const std::vector<std::int64_t>& rows, std::size_t from,
@@ -262,6 +309,7 @@ void StillnessOptions::check() const {
           "must not be below enter_ratio");
   require_not_negative("min_whiteness", min_whiteness);
   require_not_negative("turning_sigmas", turning_sigmas);
+  require_not_negative("max_wander", max_wander);
   require(std::isfinite(gap_periods) && gap_periods > 1, "gap_periods", gap_periods, "must be above 1");
 }
 
@@ -271,6 +319,21 @@ double RestNoise::activity(const Eigen::Vector3d& window_variance) const {
   for (int axis = 0; axis < 3; ++axis) {
     if (std::isnan(variance[axis])) continue;
     sum += (window_variance[axis] + kUniformVariance * quantum[axis] * quantum[axis]) / variance[axis];
+    ++axes;
+  }
+  return axes == 0 ? 0 : sum / axes;
+}
+
+double RestNoise::wander(const Eigen::Vector3d& mean_difference, int window) const {
+  // Noise that is not white leaves more in a mean: by (1 + r) / (1 - r) for neighbours correlated by r, and whiteness
+  // is 1 - r.
+  const double white = std::clamp(std::isnan(whiteness) ? 1.0 : whiteness, 0.01, 1.0);
+  const double factor = 2 * (2 - white) / white / window;
+  double sum = 0;
+  int axes = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::isnan(variance[axis])) continue;
+    sum += mean_difference[axis] * mean_difference[axis] / (factor * variance[axis]);
     ++axes;
   }
   return axes == 0 ? 0 : sum / axes;
@@ -297,7 +360,8 @@ Stillness find_stillness(std::span<const TimeNs> times_ns, const TriadRows& gyro
   out.window_samples = static_cast<int>(window);
   const auto least = static_cast<std::size_t>(std::ceil(options.min_duration_s * out.rate_hz / window));
 
-  std::vector<double> activity(usable.rows.size(), 0.0);
+  Motion motion{.activity = std::vector<double>(usable.rows.size(), 0.0),
+                .wander = std::vector<double>(usable.rows.size(), 0.0)};
   bool noise_found = true;
   const auto look_at = [&](const char* name, const TriadRows& values, RestNoise& noise) {
     if (values.rows() == 0) return;
@@ -312,29 +376,34 @@ Stillness find_stillness(std::span<const TimeNs> times_ns, const TriadRows& gyro
     noise = *found;
     note_stuck_axes(name, noise, out.quality);
     noise_found = is_noise(name, noise, options, out.quality) && noise_found;
-    raise_activity(values, noise, usable, out.window_samples, activity);
+    raise_activity(values, noise, usable, out.window_samples, motion);
   };
   look_at("gyroscope", gyroscope, out.gyroscope);
   look_at("accelerometer", accelerometer, out.accelerometer);
   if (!noise_found) return out;
 
+  std::vector<std::pair<std::size_t, std::size_t>> parts;
   for (std::size_t block = 0; block + 1 < usable.cuts.size(); ++block) {
     const std::size_t end = usable.cuts[block + 1];
     for (std::size_t k = usable.cuts[block]; k < end; ++k) {
-      if (!(activity[k] < options.enter_ratio)) continue;
+      if (!(motion.activity[k] < options.enter_ratio)) continue;
       const std::size_t from = k;
-      while (k < end && activity[k] <= options.leave_ratio) ++k;
-      StillSegment segment;
-      segment.begin = usable.rows[from];
-      segment.end = usable.rows[k - 1] + 1;
-      segment.start_ns = times_ns[static_cast<std::size_t>(segment.begin)];
-      segment.end_ns = times_ns[static_cast<std::size_t>(segment.end - 1)];
-      segment.samples = static_cast<std::int64_t>(k - from);
-      if (segment.duration_s() < options.min_duration_s) continue;
-      segment.gyroscope = statistics(gyroscope, usable.rows, from, k);
-      segment.accelerometer = statistics(accelerometer, usable.rows, from, k);
-      out.segments.push_back(segment);
+      while (k < end && motion.activity[k] <= options.leave_ratio) ++k;
+      cut_where_it_wanders(from, k, motion, static_cast<std::size_t>(out.window_samples), options.max_wander, parts,
+                           out.wandering_segments);
     }
+  }
+  for (const auto& [from, to] : parts) {
+    StillSegment segment;
+    segment.begin = usable.rows[from];
+    segment.end = usable.rows[to - 1] + 1;
+    segment.start_ns = times_ns[static_cast<std::size_t>(segment.begin)];
+    segment.end_ns = times_ns[static_cast<std::size_t>(segment.end - 1)];
+    segment.samples = static_cast<std::int64_t>(to - from);
+    if (segment.samples < 2 || segment.duration_s() < options.min_duration_s) continue;
+    segment.gyroscope = statistics(gyroscope, usable.rows, from, to);
+    segment.accelerometer = statistics(accelerometer, usable.rows, from, to);
+    out.segments.push_back(segment);
   }
   if (gyroscope.rows() > 0 && options.turning_sigmas > 0 && out.segments.size() > 1) {
     const Eigen::Vector3d bias = median_rate(out.segments);

@@ -10,7 +10,9 @@
 //    successive difference to twice the variance is 1 for white noise and near 0 for what moves smoothly.
 // 3. Still: the variance of the window around a sample, averaged over the axes in units of the noise, falls below
 //    enter_ratio and has not yet risen above leave_ratio, in each sensor that is there.
-// 4. A gyroscope that shows another mean rate than in the other segments was turning evenly: left out.
+// 4. A vibrating device that moves (a drone in flight) has white noise too, but its mean wanders from one window to the
+//    next by far more than noise of that size can: such parts are cut out.
+// 5. A gyroscope that shows another mean rate than in the other segments was turning evenly: left out.
 //
 // Even motion in a straight line cannot be told from rest, by nobody. Slow drift of the bias does no harm: it is small
 // within a window.
@@ -43,6 +45,7 @@ struct StillnessOptions {
   double leave_ratio = 6;      ///< above it, stillness ends
   double min_whiteness = 0.1;  ///< of the quietest windows, 1 for white noise; 0: not judged (strong low-pass filters)
   double turning_sigmas = 10;  ///< mean rate of a segment off the median of all, in deviations of a sample; 0: off
+  double max_wander = 4;       ///< mean square step from window to window, in units of what the noise makes; 0: off
   double gap_periods = 5;      ///< a longer pause between samples ends a segment
 
   /// @throws std::invalid_argument naming the field and its value.
@@ -57,6 +60,8 @@ struct RestNoise {
   bool known() const { return !variance.array().isNaN().all(); }
   /// Mean over the axes of the window's variance in units of the noise at rest.
   double activity(const Eigen::Vector3d& window_variance) const;
+  /// Mean over the axes of the squared difference of two neighbouring windows' means, in units of what the noise makes.
+  double wander(const Eigen::Vector3d& mean_difference, int window) const;
 };
 
 /// Mean and scatter of one sensor in a segment; NaN when the sensor is absent.
@@ -80,14 +85,15 @@ struct Stillness {
   std::vector<StillSegment> segments;
   RestNoise gyroscope;
   RestNoise accelerometer;
-  double rate_hz = kUnknown;          ///< one over the median period
-  int window_samples = 0;             ///< of the variance
-  std::int64_t samples = 0;           ///< taken
-  std::int64_t not_finite = 0;        ///< rows left out
-  std::int64_t out_of_order = 0;      ///< rows left out: not later than the one before
-  std::int64_t gaps = 0;              ///< pauses longer than gap_periods
-  std::int64_t turning_segments = 0;  ///< left out: evenly turning
-  double still_share = 0;             ///< of the samples taken
+  double rate_hz = kUnknown;            ///< one over the median period
+  int window_samples = 0;               ///< of the variance
+  std::int64_t samples = 0;             ///< taken
+  std::int64_t not_finite = 0;          ///< rows left out
+  std::int64_t out_of_order = 0;        ///< rows left out: not later than the one before
+  std::int64_t gaps = 0;                ///< pauses longer than gap_periods
+  std::int64_t wandering_segments = 0;  ///< cut or left out: vibrating, but moving
+  std::int64_t turning_segments = 0;    ///< left out: evenly turning
+  double still_share = 0;               ///< of the samples taken
   /// Refused: no noise at rest was found, segments is empty.
   Quality quality;
 };

@@ -64,13 +64,14 @@ void bind_stillness(py::module_& m) {
   const StillnessOptions d;
   py::class_<StillnessOptions>(m, "StillnessOptions", "What counts as still. No threshold has a unit.")
       .def(py::init([](double min_duration_s, double window_s, double enter_ratio, double leave_ratio,
-                       double min_whiteness, double turning_sigmas, double gap_periods) {
+                       double min_whiteness, double turning_sigmas, double max_wander, double gap_periods) {
              const StillnessOptions options{.min_duration_s = min_duration_s,
                                             .window_s = window_s,
                                             .enter_ratio = enter_ratio,
                                             .leave_ratio = leave_ratio,
                                             .min_whiteness = min_whiteness,
                                             .turning_sigmas = turning_sigmas,
+                                            .max_wander = max_wander,
                                             .gap_periods = gap_periods};
              options.check();
              return options;
@@ -78,7 +79,8 @@ void bind_stillness(py::module_& m) {
            py::kw_only(), py::arg("min_duration_s") = d.min_duration_s, py::arg("window_s") = d.window_s,
            py::arg("enter_ratio") = d.enter_ratio, py::arg("leave_ratio") = d.leave_ratio,
            py::arg("min_whiteness") = d.min_whiteness, py::arg("turning_sigmas") = d.turning_sigmas,
-           py::arg("gap_periods") = d.gap_periods, "ValueError names a field that is out of range.")
+           py::arg("max_wander") = d.max_wander, py::arg("gap_periods") = d.gap_periods,
+           "ValueError names a field that is out of range.")
       .def_readonly("min_duration_s", &StillnessOptions::min_duration_s, "shorter segments are left out")
       .def_readonly("window_s", &StillnessOptions::window_s, "over which the variance is taken")
       .def_readonly("enter_ratio", &StillnessOptions::enter_ratio, "variance over the noise's: stillness begins below")
@@ -86,6 +88,8 @@ void bind_stillness(py::module_& m) {
       .def_readonly("min_whiteness", &StillnessOptions::min_whiteness, "of the quietest windows; 0: not judged")
       .def_readonly("turning_sigmas", &StillnessOptions::turning_sigmas,
                     "mean rate off the median of all segments, in deviations of a sample; 0: off")
+      .def_readonly("max_wander", &StillnessOptions::max_wander,
+                    "mean square step from window to window over what the noise makes; 0: off")
       .def_readonly("gap_periods", &StillnessOptions::gap_periods, "a longer pause ends a segment");
 
   py::class_<RestNoise> noise(m, "RestNoise", "Noise of one sensor at rest, that stillness is measured against.");
@@ -123,6 +127,7 @@ void bind_stillness(py::module_& m) {
       .def_readonly("not_finite", &Stillness::not_finite, "rows left out")
       .def_readonly("out_of_order", &Stillness::out_of_order, "rows left out: not later than the one before")
       .def_readonly("gaps", &Stillness::gaps)
+      .def_readonly("wandering_segments", &Stillness::wandering_segments, "cut or left out: vibrating, but moving")
       .def_readonly("turning_segments", &Stillness::turning_segments, "left out: turning evenly")
       .def_readonly("still_share", &Stillness::still_share, "of the samples taken")
       .def_readonly("quality", &Stillness::quality);

@@ -138,6 +138,29 @@ TEST(Stillness, MotionAloneIsNotStill) {
   }
 }
 
+// A drone: the motors' vibration is white and always there, the motion below it smooth and smaller.
+TEST(Stillness, VibrationDoesNotHideMotion) {
+  Simulated r({20});
+  Random random(8);
+  const auto n = r.gyro.rows();
+  Eigen::Vector3d phase = 6 * random.normal3();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    r.gyro.row(i) += 0.05 * random.normal3();
+    r.accel.row(i) += 0.5 * random.normal3();
+    if (i < 500) continue;
+    const double t = 0.01 * static_cast<double>(i);
+    for (int axis = 0; axis < 3; ++axis) r.gyro(i, axis) += 0.06 * std::sin((2 + 0.7 * axis) * t + phase[axis]);
+  }
+  const Stillness s = find_stillness(r.times, r.gyro, r.accel);
+  ASSERT_EQ(s.segments.size(), 1U);
+  EXPECT_EQ(s.segments[0].begin, 0);
+  EXPECT_NEAR(static_cast<double>(s.segments[0].end), 500, 50);
+  EXPECT_GT(s.wandering_segments, 0);
+  StillnessOptions off;
+  off.max_wander = 0;
+  EXPECT_GT(find_stillness(r.times, r.gyro, r.accel, off).still_share, 0.9);
+}
+
 TEST(Stillness, EvenTurningIsNotStill) {
   Simulated r({4, 2, 4, 2, 4, 2, 4});
   // The second rest becomes a turn about the vertical, which the accelerometer does not see.
