@@ -7,7 +7,9 @@
 #include <new>
 
 #include "libloc/estimators/madgwick.hpp"
+#include "libloc/sensors/clock_gps.hpp"
 #include "libloc/sensors/stream.hpp"
+#include "libloc/sim/clock.hpp"
 #include "support/simulated_imu.hpp"
 
 namespace {
@@ -48,6 +50,24 @@ TEST(Allocation, MadgwickDoesNotAllocatePerSample) {
     ASSERT_TRUE(estimate.q_world_body.coeffs().allFinite());
   }
   EXPECT_EQ(allocations, before);
+}
+
+TEST(Allocation, ClocksDoNotAllocate) {
+  ClockChain chain;
+  ClockSimulation simulation = ClockSimulation::usb_imu();
+  simulation.events = {{ClockEvent::Kind::kDeviceReset, 50, 0}};
+  const auto samples = simulate_clock(simulation, 200, Random(1));
+  const auto gps = simulate_gps_time({}, 250, Random(2));
+  const long before = allocations;
+  std::size_t next = 0;
+  int answered = 0;
+  for (const ClockSample& s : samples) {
+    for (; gps.events[next].host_time_ns < s.host_time_ns; ++next) chain.update(gps.events[next]);
+    chain.update(s.device_time_ns, s.host_time_ns);
+    answered += chain.convert(s.device_time_ns) ? 1 : 0;
+  }
+  EXPECT_EQ(allocations, before) << "resets, fits and pairing included";
+  EXPECT_GT(answered, 39'000);
 }
 
 TEST(Allocation, TheStreamMergerKeepsItsMemory) {

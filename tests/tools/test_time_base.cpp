@@ -64,7 +64,8 @@ TEST_F(TimeBase, a_recording_comes_out_in_gps_time) {
             path("driver.err"));
   wait_until(
       [&] {
-        receiver.handle(20);
+        while (receiver.handle(20)) {
+        }
         return ended;
       },
       30 * kSecond);
