@@ -65,8 +65,9 @@ double ClockModel::lateness_ns(const Sample& sample) const {
 
 // Whether a is less late than b, by the present skew.
 bool ClockModel::below(const Sample& a, const Sample& b) const {
-  const TimeNs device = a.device_ns - b.device_ns;
-  return static_cast<double>(a.host_ns - b.host_ns - device) < line_.skew * static_cast<double>(device);
+  const TimeNs device = saturating_difference(a.device_ns, b.device_ns);
+  const TimeNs host = saturating_difference(a.host_ns, b.host_ns);
+  return static_cast<double>(saturating_difference(host, device)) < line_.skew * static_cast<double>(device);
 }
 
 bool ClockModel::update(TimeNs device_time_ns, TimeNs host_time_ns) {
@@ -93,6 +94,8 @@ bool ClockModel::update(TimeNs device_time_ns, TimeNs host_time_ns) {
 ClockModel::Doubt ClockModel::judge(const Sample& sample, double lateness) const {
   const TimeNs step = saturating_difference(sample.device_ns, last_.device_ns);
   if (step < -options_.reset_step_ns) return Doubt::kDeviceBack;
+  // Nothing to reckon with, even if both clocks agree on it.
+  if (too_far(step) || too_far(saturating_difference(sample.host_ns, last_.host_ns))) return Doubt::kEarly;
   const double gate = static_cast<double>(options_.min_step_ns) + kSigmas * line_.sigma_at_ns(sample.device_ns);
   if (lateness < -gate) return Doubt::kEarly;
   if (lateness > gate + kJitters * jitter_ns_) return Doubt::kLate;
@@ -204,7 +207,7 @@ void ClockModel::take(const Sample& sample, double lateness) {
 
 // @returns whether a bin was finished by it.
 bool ClockModel::put_into_bin(const Sample& sample) {
-  const TimeNs since = sample.device_ns - origin_ns_;
+  const TimeNs since = saturating_difference(sample.device_ns, origin_ns_);
   if (bin_count_ > 0 && since >= open_from_ns_ && since < open_from_ns_ + width_ns_) {
     Bin& open = bin(bin_count_ - 1);
     if (below(sample, open.lowest)) open.lowest = sample;
@@ -263,8 +266,9 @@ void ClockModel::fit() {
   std::array<EnvelopePoint, kBins + 1> points;
   for (std::size_t i = 0; i < count; ++i) {
     const Sample& s = bin(static_cast<int>(i)).lowest;
-    const TimeNs device = s.device_ns - newest.device_ns;
-    points[i] = {to_seconds(device), static_cast<double>(s.host_ns - newest.host_ns - device)};
+    const TimeNs device = saturating_difference(s.device_ns, newest.device_ns);
+    points[i] = {to_seconds(device),
+                 static_cast<double>(saturating_difference(saturating_difference(s.host_ns, newest.host_ns), device))};
   }
   const double span = -points[0].x_s;
   EnvelopePrior prior;
@@ -281,7 +285,7 @@ void ClockModel::fit() {
   line_.skew = std::clamp(envelope.slope * 1e-9, -kLargestSkew, kLargestSkew);
   line_.sigma_ns = envelope.sigma_value_ns;
   line_.sigma_skew = envelope.sigma_slope * 1e-9;
-  line_.valid_from_ns = bin(0).lowest.device_ns - full_width_ns_;
+  line_.valid_from_ns = saturating_difference(bin(0).lowest.device_ns, full_width_ns_);
   // The mean lateness is above a line that has just moved.
   if (in_epoch_ < kBins) jitter_ns_ = std::max(0.0, jitter_ns_ + lateness_ns(newest) - before);
 }

@@ -39,10 +39,10 @@ ClockModelOptions label_options(double max_extrapolation_s) {
   return options;
 }
 
-// To the nearest whole second.
+// To the nearest whole second; as many as int64 nanoseconds hold.
 std::int64_t seconds_of(TimeNs time_ns) {
   const TimeNs shifted = saturating_sum(time_ns, kSecond / 2);
-  return shifted / kSecond - (shifted % kSecond < 0 ? 1 : 0);
+  return std::clamp(shifted / kSecond - (shifted % kSecond < 0 ? 1 : 0), -kLargestSecond, kLargestSecond);
 }
 
 TimeNs absolute(TimeNs time_ns) {
