@@ -6,6 +6,7 @@
 #include "libloc/core/check.hpp"
 #include "libloc/io/csv.hpp"
 
+// NOLINTNEXTLINE(readability-identifier-naming): libFuzzer calls it so
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   static const loc::fuzz::MemoryFile file;

@@ -61,6 +61,7 @@ Outcome run(std::span<const std::uint8_t> bytes, std::size_t piece, const loc::N
 
 }  // namespace
 
+// NOLINTNEXTLINE(readability-identifier-naming): libFuzzer calls it so
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const std::uint8_t choice = data[0];

@@ -3,6 +3,7 @@
 #include "libloc/core/check.hpp"
 #include "libloc/io/rig_yaml.hpp"
 
+// NOLINTNEXTLINE(readability-identifier-naming): libFuzzer calls it so
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const loc::fuzz::MemoryFile file;
   const std::filesystem::path path = file.write(data, size);
