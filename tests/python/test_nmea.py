@@ -95,7 +95,7 @@ def test_broken_bytes_are_counted_as_the_independent_count_does(name):
     if name in ("blumax-gps009", "bu353-glonass", "ublox-zed-f9p-nmea"):
         assert expected["nmea.bad_checksum"] > 0
     assert got.counts["nmea.bad_checksum"] == expected["nmea.bad_checksum"]
-    # Two changes may leave the checksum correct: then the fields decide, which the independent count does not read.
+    # Two changes may leave the checksum correct: then the fields decide, which the other count does not read.
     unreadable = sum(got.counts.get(f"nmea.malformed.{field}", 0) for field in FIELDS)
     sentences = [f"nmea.{kind.lower()}" for kind in (*DECODED, "unknown")]
     assert all(got.counts[key] <= expected[key] for key in sentences)
