@@ -48,8 +48,8 @@ def check_options(parser: argparse.ArgumentParser, options: argparse.Namespace) 
         parser.error(f"--min-still {options.min_still:g}: must be a positive number")
 
 
-def _rows(triad: Triad | None) -> NDArray[np.float64]:
-    return np.zeros((0, 3)) if triad is None else triad.rows
+def _rows(triad: Triad | None) -> NDArray[np.float64] | None:
+    return None if triad is None else triad.rows
 
 
 def _together(readings: Readings, main: str, other: str, notes: list[str]) -> Triad | None:
@@ -123,11 +123,11 @@ def calibrate_accelerometer(readings: Readings, options: argparse.Namespace) -> 
     notes: list[str] = []
     gyroscope = _together(readings, "accelerometer", "gyroscope", notes)
     still = _find_stillness(times_ns, gyroscope, raw, options)
-    poses = libloc.accelerometer_poses(still.segments)
-    fit = libloc.fit_accelerometer(poses, libloc.AccelerometerOptions(gravity=options.gravity))
+    poses = len(still.segments)
+    fit = libloc.fit_accelerometer(still.segments, libloc.AccelerometerOptions(gravity=options.gravity))
     out = _empty(
         "imu.accelerometer",
-        f"accelerometer: {len(poses)} still poses in {len(raw)} readings of {readings.name}",
+        f"accelerometer: {poses} still poses in {len(raw)} readings of {readings.name}",
         _counts(readings, still),
         notes,
     )
@@ -144,7 +144,7 @@ def calibrate_accelerometer(readings: Readings, options: argparse.Namespace) -> 
         return out
     milli_g = 1e3 / options.gravity
     out.facts += [
-        ("poses used", f"{fit.inliers} of {len(poses)}, {fit.distinct_poses} of them distinct"),
+        ("poses used", f"{fit.inliers} of {poses}, {fit.distinct_poses} of them distinct"),
         ("fit", f"{milli_g * fit.residual_rms:.3f} mg rms over the poses used"),
         ("leave one out", f"{milli_g * fit.leave_one_out_rms:.3f} mg rms, each pose predicted by the others"),
         ("predicted error", f"{1e3 * fit.predicted_error:.3f} mg of a corrected reading in any direction"),
@@ -162,13 +162,13 @@ def calibrate_accelerometer(readings: Readings, options: argparse.Namespace) -> 
     )
     triad.quality.verdict, triad.quality.reasons = worst, out.reasons
     out.tables = triad_tables(triad, raw, "zero-g offset", "scale and cross-axis")
-    means = np.array([pose.mean for pose in poses])
+    means = np.array([segment.accelerometer_mean for segment in still.segments])
     corrected = (means - triad.bias) @ triad.matrix.T
     out.pictures += [
         Picture(
             "residuals",
             "What remains of each pose, and by how much the other poses miss it.",
-            partial(inertial_plots.plot_pose_residuals, fit.poses, options.gravity),
+            partial(inertial_plots.plot_pose_residuals, fit, options.gravity),
         ),
         Picture(
             "spheres",
@@ -187,7 +187,7 @@ def calibrate_accelerometer(readings: Readings, options: argparse.Namespace) -> 
         Picture(
             "coverage",
             "Directions in which gravity was seen. The calibration is a guess where there are none.",
-            partial(inertial_plots.plot_pose_directions, corrected, fit.poses),
+            partial(inertial_plots.plot_pose_directions, corrected, fit.inlier),
         ),
     ]
 
@@ -217,8 +217,9 @@ def calibrate_gyroscope(readings: Readings, options: argparse.Namespace) -> Outc
         fit = libloc.fit_gyroscope_bias(still.segments)
         _merge(out, still.quality, fit.quality)
     else:
-        poses = libloc.accelerometer_poses(still.segments)
-        gravity = libloc.fit_accelerometer(poses, libloc.AccelerometerOptions(gravity=options.gravity))
+        gravity = libloc.fit_accelerometer(
+            still.segments, libloc.AccelerometerOptions(gravity=options.gravity)
+        )
         fit = libloc.fit_gyroscope(times_ns, raw.rows, still.segments, gravity)
         _merge(out, still.quality, fit.quality)
         notes.append(
@@ -247,7 +248,7 @@ def calibrate_gyroscope(readings: Readings, options: argparse.Namespace) -> Outc
     )
     if fit.matrix_known:
         out.facts += [
-            ("turns used", f"{fit.inliers} of {len(fit.turns)}"),
+            ("turns used", f"{fit.inliers} of {len(fit.turn_inlier)}"),
             ("residual rms", f"{np.rad2deg(fit.residual_rms):.3f} deg between gravity as turned and as seen"),
             ("scale known to", f"{100 * fit.relative_sigma:.3f} % in the worst direction"),
             ("turned against", f"the accelerometer by {np.rad2deg(fit.rotation_angle):.3f} deg"),
@@ -279,7 +280,7 @@ def calibrate_gyroscope(readings: Readings, options: argparse.Namespace) -> Outc
             Picture(
                 "turns",
                 "For each turn, how far gravity as the gyroscope turned it is from gravity as it was seen.",
-                partial(inertial_plots.plot_turns, fit.turns),
+                partial(inertial_plots.plot_turns, fit),
             )
         )
 

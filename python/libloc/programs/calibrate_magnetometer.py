@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 import libloc
+from libloc.programs import calibrate_alignment as alignment
 from libloc.programs import calibrate_live
 from libloc.programs import calibrate_plots as plots
 from libloc.programs.calibrate_input import COUNTS, Readings, Triad
@@ -28,8 +29,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         metavar="UT",
         help="strength of the earth's field here [uT]: corrected readings get this norm (default: they keep "
-        "their own mean)",
+        "their own mean, or the magnetic model's where a place is given)",
     )
+    alignment.add_options(parser)
     calibrate_live.add_options(parser)
 
 
@@ -41,11 +43,15 @@ def check_options(parser: argparse.ArgumentParser, options: argparse.Namespace) 
         value = getattr(options, name)
         if value is not None and not (np.isfinite(value) and value > 0):
             parser.error(f"--{name.replace('_', '-')} {value:g}: must be a positive number")
+    alignment.check_options(parser, options)
 
 
 def reference_norm(options: argparse.Namespace) -> float:
     """[T]; 0: the readings' own."""
-    return 0.0 if options.field_ut is None else options.field_ut * 1e-6
+    if options.field_ut is not None:
+        return float(options.field_ut) * 1e-6
+    expected = alignment.expected_field(options)
+    return 0.0 if expected is None else expected.strength
 
 
 def _pictures(fit: libloc.EllipsoidFit, raw: Triad, triad: libloc.TriadCalibration) -> list[Picture]:
@@ -84,6 +90,66 @@ def _pictures(fit: libloc.EllipsoidFit, raw: Triad, triad: libloc.TriadCalibrati
             partial(plots.plot_coverage, fit.coverage, "the field in the sensor's axes"),
         ),
     ]
+
+
+def _lower(out: Outcome, triad: libloc.TriadCalibration, verdict: libloc.Verdict, reasons: list[str]) -> None:
+    """The verdict of the block, and of the rig's entry, is the worst of its parts."""
+    out.verdict = max(out.verdict, verdict)
+    out.reasons += [reason for reason in reasons if reason not in out.reasons]
+    quality = triad.quality
+    assert quality is not None
+    quality.verdict, quality.reasons = out.verdict, out.reasons
+
+
+def _with_imu(
+    out: Outcome,
+    fit: libloc.EllipsoidFit,
+    triad: libloc.TriadCalibration,
+    readings: Readings,
+    raw: Triad,
+    options: argparse.Namespace,
+) -> libloc.TriadCalibration:
+    """The triad turned to the IMU's axes where the recording shows how; the comparison with the magnetic model."""
+    found = alignment.align(readings, raw, triad, options)
+    result, dip = found.result, float("nan")
+    if result is not None and result.solved and result.quality.usable:
+        triad = libloc.aligned(triad, result)
+        out.facts += alignment.facts(result)
+        dip = result.dip
+        _lower(out, triad, result.quality.verdict, list(result.quality.reasons))
+    else:
+        if result is not None:
+            found.note = "The rotation to the IMU was not found: " + " ".join(result.quality.reasons)
+        out.notes += [
+            found.note,
+            "The matrix is symmetric: corrected readings keep the magnetometer's own axes. Use it with an "
+            "IMU only "
+            "if both chips have the same axes.",
+        ]
+    expected = alignment.expected_field(options)
+    if expected is None:
+        return triad
+    from libloc.magnetic_model import check
+
+    strength = float("nan") if raw.unit == COUNTS else fit.radius
+    out.facts.append(
+        (
+            "expected here",
+            f"{1e6 * expected.strength:.2f} uT, dip {np.rad2deg(expected.dip):.2f} deg, declination "
+            f"{np.rad2deg(expected.declination):.2f} deg ({expected.model})",
+        )
+    )
+    if np.isfinite([strength, dip]).any():
+        said = check(
+            np.deg2rad(options.latitude),
+            np.deg2rad(options.longitude),
+            options.altitude,
+            options.date,
+            strength,
+            dip,
+        )
+        _lower(out, triad, said.verdict, said.reasons)
+    return triad
 
 
 def calibrate(readings: Readings, options: argparse.Namespace) -> Outcome:
@@ -128,15 +194,13 @@ def calibrate(readings: Readings, options: argparse.Namespace) -> Outcome:
         ("directions seen", f"{fit.cells_hit} of 100 cells of equal area"),
     ]
     triad = fit.triad()
-    if raw.unit == COUNTS and options.field_ut is None:
+    if raw.unit == COUNTS and reference_norm(options) == 0:
         out.notes.append(
-            "The readings are counts and no --field-ut was given: corrected readings are counts, too, not "
-            "tesla."
+            "The readings are counts and neither --field-ut nor a place was given: corrected readings are "
+            "counts, "
+            "too, not tesla."
         )
-    out.notes.append(
-        "The matrix is symmetric: by how much the magnetometer is turned against the IMU cannot be told from "
-        "its norm."
-    )
+    triad = _with_imu(out, fit, triad, readings, raw, options)
     out.tables = triad_tables(triad, raw, "hard iron", "soft iron, scale, cross-axis")
     out.pictures = _pictures(fit, raw, triad)
 

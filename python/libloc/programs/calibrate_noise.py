@@ -34,19 +34,6 @@ def _table(name: str, fits: list[libloc.AllanFit], units: tuple[str, str, str]) 
     return Table(name, ["", "x", "y", "z"], rows)
 
 
-def _measured(allan: libloc.ImuAllan) -> list[str]:
-    """Names of the rig's fields that at least one axis shows."""
-    out = []
-    for name, fits, present in (
-        ("gyroscope", allan.gyroscope, allan.has_gyroscope),
-        ("accelerometer", allan.accelerometer, allan.has_accelerometer),
-    ):
-        for term in ("noise_density", "random_walk"):
-            if present and any(getattr(fit, term).identified for fit in fits):
-                out.append(f"{name}_{term}")
-    return out
-
-
 def calibrate(readings: Readings, options: argparse.Namespace) -> Outcome:
     """Raises DataError when there is no IMU or no time in it, or its unit is not known."""
     there = [name for name in ("gyroscope", "accelerometer") if getattr(readings, name) is not None]
@@ -61,9 +48,8 @@ def calibrate(readings: Readings, options: argparse.Namespace) -> Outcome:
             raise DataError(
                 f"{readings.name}: gyroscope and accelerometer have different times: give one at a time"
             )
-    none = np.zeros((0, 3))
-    gyroscope = none if readings.gyroscope is None else readings.gyroscope.rows
-    accelerometer = none if readings.accelerometer is None else readings.accelerometer.rows
+    gyroscope = None if readings.gyroscope is None else readings.gyroscope.rows
+    accelerometer = None if readings.accelerometer is None else readings.accelerometer.rows
     allan = libloc.analyse_imu_noise(times_ns, gyroscope, accelerometer)
     fallback = libloc.ImuNoise()
     if options.out is not None and options.out.exists():
@@ -79,12 +65,12 @@ def calibrate(readings: Readings, options: argparse.Namespace) -> Outcome:
         facts=[("still part", f"{allan.duration_s:.1f} s, {100 * allan.used_share:.1f} % of the recording")],
         counts=readings.counts,
     )
-    measured = _measured(allan)
+    measured = fit.measured
     if not measured:
         return out
-    if allan.has_gyroscope:
+    if allan.gyroscope:
         out.tables.append(_table("gyroscope", allan.gyroscope, ("rad/s/√Hz", "rad/s", "rad/s²/√Hz")))
-    if allan.has_accelerometer:
+    if allan.accelerometer:
         out.tables.append(_table("accelerometer", allan.accelerometer, ("m/s²/√Hz", "m/s²", "m/s³/√Hz")))
     names = (
         "gyroscope_noise_density",
@@ -132,5 +118,5 @@ def calibrate(readings: Readings, options: argparse.Namespace) -> Outcome:
 
 
 def _rate_hz(allan: libloc.ImuAllan) -> float:
-    fits = allan.gyroscope if allan.has_gyroscope else allan.accelerometer
+    fits = allan.gyroscope or allan.accelerometer
     return float(fits[0].rate_hz)

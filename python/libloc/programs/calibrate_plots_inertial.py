@@ -38,14 +38,12 @@ def plot_stillness(
     return figure
 
 
-def plot_pose_residuals(poses: Sequence[libloc.PoseFit], gravity: float) -> Figure:
+def plot_pose_residuals(fit: libloc.AccelerometerFit, gravity: float) -> Figure:
     figure = new_figure(11, 4)
     axes = figure.add_subplot()
     milli_g = 1e3 / gravity
-    number = np.arange(len(poses))
-    residual = milli_g * np.array([pose.residual for pose in poses])
-    left_out = milli_g * np.array([pose.left_out for pose in poses])
-    used = np.array([pose.inlier for pose in poses], dtype=bool)
+    residual, left_out, used = milli_g * fit.residuals, milli_g * fit.left_out, fit.inlier
+    number = np.arange(len(used))
     axes.bar(number[used], residual[used], color=CORRECTED, label="fit")
     axes.plot(number[used], left_out[used], "o", color=RAW, ms=4, label="predicted by the others")
     shown = np.concatenate([residual[used], left_out[used]])
@@ -63,18 +61,17 @@ def plot_pose_residuals(poses: Sequence[libloc.PoseFit], gravity: float) -> Figu
     return figure
 
 
-def plot_pose_directions(corrected: NDArray[np.float64], poses: Sequence[libloc.PoseFit]) -> Figure:
+def plot_pose_directions(corrected: NDArray[np.float64], used: NDArray[np.bool]) -> Figure:
     figure = new_figure(9, 4.5)
     axes = figure.add_subplot()
     draw_coverage(axes, np.zeros((10, 10), dtype=np.int32))
     unit = corrected / np.linalg.norm(corrected, axis=1, keepdims=True)
     azimuth = np.rad2deg(np.arctan2(unit[:, 1], unit[:, 0])) % 360
-    used = np.array([pose.inlier for pose in poses], dtype=bool)
     axes.plot(azimuth[used], unit[used, 2], "o", color=CORRECTED, label="used", clip_on=False)
     if not used.all():
         axes.plot(azimuth[~used], unit[~used, 2], "x", color="tab:red", label="left out", clip_on=False)
         axes.legend(loc="upper right")
-    axes.set_title(f"direction of gravity in {len(poses)} poses, on a map of equal areas")
+    axes.set_title(f"direction of gravity in {len(used)} poses, on a map of equal areas")
     return figure
 
 
@@ -85,7 +82,7 @@ def plot_rest_bias(
     axes = figure.add_subplot()
     start = segments[0].start_ns
     t = np.array([(segment.start_ns - start) * 1e-9 for segment in segments])
-    means = unit[0] * (np.array([segment.gyroscope.mean for segment in segments]) - bias)
+    means = unit[0] * (np.array([segment.gyroscope_mean for segment in segments]) - bias)
     for axis, colour in enumerate(_AXES):
         axes.plot(t, means[:, axis], "o-", ms=3, lw=0.8, color=colour, label="xyz"[axis])
     axes.axhline(0, color="0.5", lw=0.8)
@@ -95,12 +92,11 @@ def plot_rest_bias(
     return figure
 
 
-def plot_turns(turns: Sequence[libloc.GyroscopeTurn]) -> Figure:
+def plot_turns(fit: libloc.GyroscopeFit) -> Figure:
     figure = new_figure(11, 4)
     axes = figure.add_subplot()
-    residual = np.rad2deg([turn.residual for turn in turns])
-    angle = np.rad2deg([turn.gravity_angle for turn in turns])
-    used = np.array([turn.inlier for turn in turns], dtype=bool)
+    residual, angle = np.rad2deg(fit.turn_residuals), np.rad2deg(fit.turn_gravity_angle)
+    used = fit.turn_inlier
     axes.plot(angle[used], residual[used], "o", color=CORRECTED, label="used")
     if not used.all():
         axes.plot(angle[~used], residual[~used], "x", color="tab:red", label="left out")
@@ -126,22 +122,21 @@ def plot_allan(allan: libloc.ImuAllan) -> Figure:
     """Curves of all axes with their deviations; dashed the terms that were identified."""
     panels = [
         (fits, name, unit)
-        for fits, name, unit, present in (
-            (allan.gyroscope, "gyroscope", "rad/s", allan.has_gyroscope),
-            (allan.accelerometer, "accelerometer", "m/s²", allan.has_accelerometer),
+        for fits, name, unit in (
+            (allan.gyroscope, "gyroscope", "rad/s"),
+            (allan.accelerometer, "accelerometer", "m/s²"),
         )
-        if present
+        if fits
     ]
     figure = new_figure(6.2 * len(panels), 5)
     for i, (fits, name, unit) in enumerate(panels):
         axes = figure.add_subplot(1, len(panels), i + 1)
         lowest, highest = np.inf, 0.0
         for axis, (fit, colour) in enumerate(zip(fits, _AXES, strict=True)):
-            tau = np.array([p.tau_s for p in fit.points])
+            tau, deviation = fit.tau_s, fit.deviation
             if not len(tau):
                 continue
-            deviation = np.array([p.deviation for p in fit.points])
-            sigma = np.minimum(np.array([p.sigma for p in fit.points]), 0.9 * deviation)
+            sigma = np.minimum(fit.sigma, 0.9 * deviation)
             axes.errorbar(tau, deviation, sigma, color=colour, lw=1, capsize=2, label="xyz"[axis])
             for term, kind in (
                 (fit.noise_density, "noise"),
