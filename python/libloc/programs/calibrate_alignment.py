@@ -1,4 +1,4 @@
-"""loc-calibrate magnetometer, second part: its rotation to the IMU, and the comparison with the magnetic model."""
+"""loc-calibrate magnetometer, second part: rotation to the IMU, comparison with the magnetic model."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """loc-calibrate clock: how the clock that stamps a stream runs against the host's clock.
 
-INPUT is an LCM log whose messages say when they arrived (host_time_ns), or a table of two columns, --columns
-device_ns,host_ns. Arrivals are late, never early: the line is laid under them. What comes out is the skew, how late
-arrivals are, and how well a stamp can be put on the host's clock.
+INPUT is an LCM log whose messages say when they arrived (host_time_ns), or a table of two columns,
+--columns device_ns,host_ns. Arrivals are late, never early: the line is laid under them. What comes out is
+the skew, how late arrivals are, and how well a stamp can be put on the host's clock.
 """
 
 from __future__ import annotations

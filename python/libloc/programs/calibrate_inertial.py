@@ -1,9 +1,9 @@
-"""loc-calibrate accelerometer and gyroscope: from a device that is put down in many poses and lies still in each.
+"""loc-calibrate accelerometer and gyroscope: from a device that is put down in many poses.
 
-Move the device by hand into 15 or more poses, in all directions, and let it lie for a second or more in each; a table
-is best, no turntable is needed. Still poses are found by themselves. The accelerometer's poses give bias, scale and
-cross-axis (9 poses at least); a gyroscope in the same recording gets its bias from rest, and its scale and its
-alignment to the accelerometer from the turns between the poses.
+Move the device by hand into 15 or more poses, in all directions, and let it lie for a second or more in
+each; a table is best, no turntable is needed. Still poses are found by themselves. The accelerometer's
+poses give bias, scale and cross-axis (9 poses at least); a gyroscope in the same recording gets its bias
+from rest, and its scale and its alignment to the accelerometer from the turns between the poses.
 """
 
 from __future__ import annotations

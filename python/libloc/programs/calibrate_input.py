@@ -335,7 +335,7 @@ def read_readings(path: Path, sensor: str, options: InputOptions) -> Readings:
 def read_stamps_table(
     path: Path, options: InputOptions
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], dict[str, int]]:
-    """Two columns of times: of the device and of the arrival at the host, both [ns]. Unit in the names: device_us.
+    """Two columns of times, of the device and of the arrival at the host; units in the names: device_us.
 
     Raises DataError naming file, line and value.
     """
@@ -344,7 +344,7 @@ def read_stamps_table(
     heading = not all(_is_number(cell) for cell in first)
     names = options.columns.split(",") if options.columns else first
     if not heading and not options.columns:
-        raise DataError(f"{path}: the first line is numbers: name the columns, --columns device_ns,host_ns")
+        raise DataError(f"{path}: the first line is numbers: --columns device_ns,host_ns names them")
     at: dict[str, tuple[int, str]] = {}
     for i, name in enumerate(names):
         kind, _, unit = name.strip().partition("_")

@@ -1,7 +1,8 @@
 """loc-calibrate imu-noise: noise densities and random walks from a device that lies still.
 
-The longer it lies, the more can be told: a minute gives the noise densities, an hour and more the random walks of the
-biases. What the recording does not show keeps the rig's value, or a bound; the rig file says which were measured.
+The longer it lies, the more can be told: a minute gives the noise densities, an hour and more the random
+walks of the biases. What the recording does not show keeps the rig's value, or a bound; the rig file says
+which were measured.
 """
 
 from __future__ import annotations

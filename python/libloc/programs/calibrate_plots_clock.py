@@ -18,7 +18,7 @@ def plot_clock(
     converted_ns: NDArray[np.int64],
     sigma_ns: NDArray[np.float64],
 ) -> Figure:
-    """Lateness of the arrivals above the line as it was known at the time, and the skew of the line over time."""
+    """Lateness of the arrivals above the line as known at the time, and the skew of the line over time."""
     figure = new_figure(11, 8)
     top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(2, 1.2, 1.2))
     t = (host_ns - host_ns[0]) * 1e-9

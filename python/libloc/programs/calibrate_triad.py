@@ -24,7 +24,7 @@ def display_unit(triad: Triad) -> tuple[float, str]:
 def symmetric_sigma(
     cov: NDArray[np.float64], rotation: NDArray[np.float64] | None = None
 ) -> NDArray[np.float64]:
-    """Deviations of the entries of a symmetric W, or of rotation @ W, (3, 3). cov: (9, 9), W's are the last six."""
+    """Deviations of the entries of a symmetric W or of rotation @ W. cov: (9, 9), W's are the last six."""
     jacobian = np.zeros((9, 6))
     for k, (i, j) in enumerate(_ENTRIES):
         entry = np.zeros((3, 3))
