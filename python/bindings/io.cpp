@@ -2,8 +2,11 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <GeographicLib/LocalCartesian.hpp>
 #include <filesystem>
 #include <memory>
+#include <numbers>
+#include <tuple>
 #include <utility>
 
 #include "arrays.hpp"
@@ -16,6 +19,7 @@
 #include "libloc/io/lcm_log.hpp"
 #include "libloc/io/rig_yaml.hpp"
 #include "libloc/io/tum.hpp"
+#include "msgs/decode.hpp"
 #include "msgs/lcm_log_source.hpp"
 #include "recording.hpp"
 
@@ -130,6 +134,17 @@ void bind_sources(py::module_& m) {
              return std::move(*measurement);
            })
       .def("read_all", &read_all, "The rest of the recording as arrays.")
+      .def_property_readonly(
+          "origin",
+          [](const MeasurementSource& self) {
+            std::optional<std::tuple<double, double, double>> out;
+            const auto* log = dynamic_cast<const loc::LcmLogSource*>(&self);
+            const std::optional<loc::GeodeticPoint> origin = log != nullptr ? log->origin() : std::nullopt;
+            if (origin) out.emplace(origin->latitude, origin->longitude, origin->altitude);
+            return out;
+          },
+          "Latitude, longitude [rad] and altitude [m] of the world's origin of a reference that is given in degrees "
+          "(ASPN-23); None before its first position, and for other recordings.")
       .def(
           "counts", [](const MeasurementSource& self) { return as_map(self.counts()); },
           "What was read and what was skipped, and why: {name: number}.");
@@ -204,6 +219,29 @@ void bind_lcm_log(py::module_& m) {
           "What was not readable so far; empty when all was.");
 }
 
+void bind_geodesy(py::module_& m) {
+  m.def(
+      "local_positions",
+      [](const FloatArray& geodetic, const ArrayLike& origin) {
+        const Rows<3> rows = rows_view<3>(geodetic, "latitude_longitude_altitude");
+        constexpr double kDegrees = 180 / std::numbers::pi;
+        const Eigen::Vector3d at = vector3(origin, "origin");
+        if (!at.allFinite() || std::abs(at.x()) * kDegrees > 90) {
+          throw py::value_error("origin: must be finite, with a latitude between -pi/2 and pi/2");
+        }
+        const GeographicLib::LocalCartesian plane(at.x() * kDegrees, at.y() * kDegrees, at.z());
+        py::array_t<double> out({rows.rows(), Eigen::Index{3}});
+        double* p = out.mutable_data();
+        for (Eigen::Index i = 0; i < rows.rows(); ++i, p += 3) {
+          plane.Forward(rows(i, 0) * kDegrees, rows(i, 1) * kDegrees, rows(i, 2), p[0], p[1], p[2]);
+        }
+        return out;
+      },
+      py::arg("latitude_longitude_altitude"), py::arg("origin"),
+      "East, north, up (N, 3) [m] of positions on the WGS 84 ellipsoid, [rad, rad, m], in the plane that touches it at "
+      "the origin. NaN stays NaN.");
+}
+
 void bind_tum(py::module_& m) {
   m.def(
       "read_tum",
@@ -223,6 +261,7 @@ void bind_io(py::module_& m) {
   bind_sources(m);
   bind_lcm_log(m);
   bind_tum(m);
+  bind_geodesy(m);
   m.def("read_rig", &loc::read_rig, py::arg("path"), "rig.yaml. DataError names file, line, key and value.");
   m.def("read_any_rig", &loc::read_any_rig, py::arg("path"),
         "rig.yaml, Kalibr's camchain or imu.yaml, EuRoC's sensor.yaml: whichever it is.");

@@ -1,7 +1,9 @@
 """loc-calibrate accelerometer, gyroscope, imu-noise and clock, and the magnetometer's rotation to the IMU."""
 
+import os
 import re
 
+import loc
 import numpy as np
 import pytest
 from libloc.lcm_log import LogWriter
@@ -186,8 +188,6 @@ def test_clock(tmp_path, capsys):
     assert {p.name for p in (tmp_path / "r").iterdir()} == {"report.html", "arrivals.png"}
 
     # The same as messages in a log.
-    import loc
-
     with LogWriter(tmp_path / "clock.lcm") as log:
         for i, (d, h) in enumerate(zip(device.tolist(), host.tolist(), strict=True)):
             m = loc.imu_t()
@@ -219,6 +219,56 @@ def test_stamps_that_cannot_be_read(tmp_path, capsys, text, message):
 def test_a_recording_without_arrivals(tmp_path, capsys):
     path = data_folder("broad") / "01_undisturbed_slow_rotation_A.mat"
     assert "does not say when its samples arrived" in run(capsys, "clock", path, code=1)
+
+
+def test_gps_latency_of_the_pntos_drive(tmp_path, capsys):
+    if "LIBLOC_PNTOS_LOG" not in os.environ:
+        pytest.skip("LIBLOC_PNTOS_LOG does not name cobra_gps_ins_example_data.log")
+    rig = tmp_path / "rig.yaml"
+
+    def lever_arm(r):
+        r.gps = libloc.GpsCalibration()
+        r.gps.antenna_in_body = [0.1, 0.2, 0.3]
+
+    libloc.update_rig(rig, lever_arm)
+    text = run(
+        capsys, "gps-latency", os.environ["LIBLOC_PNTOS_LOG"], "--out", rig, "--report", tmp_path / "r"
+    )
+    gps = libloc.read_rig(rig).gps
+    assert gps.time_offset_s == pytest.approx(-0.20, abs=0.02)
+    assert 0 < gps.time_offset_sigma_s < 0.03
+    assert gps.antenna_in_body.tolist() == [0.1, 0.2, 0.3]
+    before, after = map(float, re.search(r"([\d.]+) m as stamped, ([\d.]+) m with", text).groups())
+    assert (before, after) == (pytest.approx(2.48, abs=0.02), pytest.approx(1.62, abs=0.02))
+    assert {p.name for p in (tmp_path / "r").iterdir()} == {"report.html", "latency.png"}
+
+
+def test_gps_latency_needs_fixes_and_a_reference(tmp_path, capsys):
+    r = turning_body(50)
+    write_csv(tmp_path / "own.csv", r)
+    assert "no GPS fix" in run(capsys, "gps-latency", tmp_path / "own.csv", code=1)
+    with LogWriter(tmp_path / "gps.lcm") as log:
+        fix = loc.gps_fix_t()
+        fix.time_ns, fix.fix = 10**18, 3
+        log.write("LOC_GPS", fix, 10**15)
+    assert "no reference trajectory" in run(capsys, "gps-latency", tmp_path / "gps.lcm", code=1)
+
+
+def test_local_positions():
+    """Against the formulas of the ellipsoid."""
+    origin = np.array([0.8, 0.2, 100.0])
+    points = np.array([origin, [0.8001, 0.2, 100.0], [0.8, 0.2001, 100.0], [0.8, 0.2, 350.0], [np.nan] * 3])
+    got = libloc.local_positions(points, origin)
+    a, e2 = 6378137.0, 6.69437999014e-3
+    w = 1 - e2 * np.sin(0.8) ** 2
+    meridian, normal = a * (1 - e2) / w**1.5, a / np.sqrt(w)
+    assert np.allclose(got[0], 0, atol=1e-8)
+    assert got[1, :2] == pytest.approx([0, 1e-4 * (meridian + 100)], abs=0.05)
+    assert got[2, :2] == pytest.approx([1e-4 * (normal + 100) * np.cos(0.8), 0], abs=0.05)
+    assert got[3] == pytest.approx([0, 0, 250], abs=1e-8)
+    assert np.isnan(got[4]).all()
+    with pytest.raises(ValueError, match="origin"):
+        libloc.local_positions(points, [2, 0, 0])
 
 
 def test_magnetometer_is_turned_to_the_imu(tmp_path, capsys):

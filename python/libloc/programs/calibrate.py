@@ -24,6 +24,7 @@ import libloc
 from libloc import DataError, Verdict
 from libloc.programs import (
     calibrate_clock,
+    calibrate_gps,
     calibrate_inertial,
     calibrate_input,
     calibrate_live,
@@ -121,6 +122,15 @@ def make_parser() -> argparse.ArgumentParser:
     _add_input_options(clock)
     calibrate_clock.add_options(clock)
     _add_output_options(clock)
+    gps = _add_command(
+        commands,
+        "gps-latency",
+        "how late a receiver's fixes are stamped, against a reference",
+        calibrate_gps.__doc__ or "",
+    )
+    gps.add_argument("input", type=Path, nargs="+", metavar="INPUT", help="LCM log")
+    calibrate_gps.add_options(gps)
+    _add_output_options(gps)
     return parser
 
 
@@ -162,6 +172,8 @@ def calibrated(options: argparse.Namespace) -> Outcome:
     """Reads and calibrates. Raises DataError (ValueError) for data that cannot be calibrated."""
     if options.command == "clock":
         return calibrate_clock.calibrate(options, _input_options(options))
+    if options.command == "gps-latency":
+        return calibrate_gps.calibrate(options)
     return _COMMANDS[options.command][1](read_inputs(options), options)
 
 
@@ -197,6 +209,8 @@ def main(arguments: list[str] | None = None) -> int:
         calibrate_magnetometer.check_options(parser, options)
     elif options.command in ("accelerometer", "gyroscope"):
         calibrate_inertial.check_options(parser, options)
+    elif options.command == "gps-latency":
+        calibrate_gps.check_options(parser, options)
     try:
         if options.out is not None and options.out.exists():
             libloc.read_rig(options.out)  # before the work, not after it

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import libloc
-from libloc.programs.calibrate_input import COUNTS, Readings, Triad
+from libloc.programs.calibrate_input import COUNTS, Readings, Triad, same_times
 
 if TYPE_CHECKING:
     from libloc.magnetic_model import Field
@@ -103,7 +103,7 @@ def align(
         return Aligned(note="The gyroscope is in counts: the rotation to the IMU is not known.")
     rates = gyroscope.rows
     force = None
-    if accelerometer is not None and np.array_equal(accelerometer.times_ns, gyroscope.times_ns):
+    if accelerometer is not None and same_times(accelerometer, gyroscope):
         force = accelerometer.rows
     if options.out is not None and options.out.exists():
         # The rig's IMU may be calibrated already: its axes are what the magnetometer is turned to.

@@ -20,7 +20,10 @@ from libloc.programs import calibrate_plots_clock as clock_plots
 from libloc.programs.calibrate_input import InputOptions, read_stamps_table
 from libloc.programs.calibrate_report import Outcome, Picture, Table, with_sigma
 
-STREAMS = {
+_Stamped = (
+    libloc.ImuMeasurement | libloc.MagnetometerMeasurement | libloc.GpsMeasurement | libloc.ImageMeasurement
+)
+STREAMS: dict[str, type[_Stamped]] = {
     "imu": libloc.ImuMeasurement,
     "magnetometer": libloc.MagnetometerMeasurement,
     "gps": libloc.GpsMeasurement,

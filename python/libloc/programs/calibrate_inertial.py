@@ -18,7 +18,7 @@ import libloc
 from libloc import DataError
 from libloc.programs import calibrate_plots as plots
 from libloc.programs import calibrate_plots_inertial as inertial_plots
-from libloc.programs.calibrate_input import COUNTS, GRAVITY, Readings, Triad
+from libloc.programs.calibrate_input import COUNTS, GRAVITY, Readings, Triad, same_times
 from libloc.programs.calibrate_report import Outcome, Picture
 from libloc.programs.calibrate_triad import display_unit, quality_of, symmetric_sigma, triad_tables
 
@@ -57,7 +57,7 @@ def _together(readings: Readings, main: str, other: str, notes: list[str]) -> Tr
     triad: Triad | None = getattr(readings, other)
     if triad is None:
         return None
-    if not np.array_equal(triad.times_ns, getattr(readings, main).times_ns):
+    if not same_times(triad, getattr(readings, main)):
         notes.append(f"The {other} has other times than the {main}: it was left aside.")
         return None
     return triad

@@ -52,6 +52,11 @@ class Triad:
         return len(self.rows)
 
 
+def same_times(a: Triad, b: Triad) -> bool:
+    """Read together: sample by sample at the same times."""
+    return a.times_ns is not None and b.times_ns is not None and np.array_equal(a.times_ns, b.times_ns)
+
+
 @dataclass
 class Readings:
     """What one calibration takes: a sensor that is absent is None."""

@@ -31,6 +31,7 @@ from libloc.programs.calibrate_input import SI, Readings, Triad
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"
 _EVALUATE_S, _PICTURE_S, _LINE_S = 0.5, 3.0, 1.0
+_MESSAGES: Any = loc  # lcm-gen writes no types
 _CONFIRMATIONS = 2  # evaluations in a row that must say "enough"
 
 
@@ -149,15 +150,15 @@ class Collection:
             self.counts[f"{channel}.refused"] += 1
             return False
         if name == "source_status_t":
-            status = loc.source_status_t.decode(data)
-            if status.state != loc.source_status_t.STATE_RUNNING:
+            status = _MESSAGES.source_status_t.decode(data)
+            if status.state != _MESSAGES.source_status_t.STATE_RUNNING:
                 self.ended = status.message or "the source has ended"
             return False
         if name == "imu_t":
-            m = loc.imu_t.decode(data)
+            m = _MESSAGES.imu_t.decode(data)
             self._append("imu", self.imu, m.time_ns, m.sequence, (*m.angular_velocity, *m.specific_force))
             return False
-        m = loc.magnetometer_t.decode(data)
+        m = _MESSAGES.magnetometer_t.decode(data)
         self._append("magnetometer", self.magnetometer, m.time_ns, m.sequence, tuple(m.magnetic_field))
         self.collector.add(list(m.magnetic_field))
         return True

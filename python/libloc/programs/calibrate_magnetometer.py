@@ -109,7 +109,7 @@ def _with_imu(
     raw: Triad,
     options: argparse.Namespace,
 ) -> libloc.TriadCalibration:
-    """The triad turned to the IMU's axes where the recording shows how; comparison with the magnetic model."""
+    """The triad turned to the IMU's axes if the recording shows how; comparison with the magnetic model."""
     found = alignment.align(readings, raw, triad, options)
     result, dip = found.result, float("nan")
     if result is not None and result.solved and result.quality.usable:

@@ -58,3 +58,26 @@ def plot_clock(
     for axes in (top, middle, bottom):
         axes.grid(alpha=0.3)
     return figure
+
+
+def plot_latency(
+    times_ns: NDArray[np.int64], before: NDArray[np.float64], after: NDArray[np.float64]
+) -> Figure:
+    """Horizontal error of each fix over time, and how the errors are distributed."""
+    figure = new_figure(11, 4.5)
+    grid = figure.add_gridspec(1, 2, width_ratios=(3, 1))
+    axes = figure.add_subplot(grid[0, 0])
+    t = (times_ns - times_ns[0]) * 1e-9
+    reach = 1.1 * float(np.nanpercentile(np.concatenate([before, after]), 99.5))
+    axes.plot(t, before, ".", ms=2, color=RAW, label="as stamped")
+    axes.plot(t, after, ".", ms=2, color=CORRECTED, label="with the offset")
+    axes.set(xlabel="time [s]", ylabel="horizontal error [m]", ylim=(0, reach))
+    axes.legend(loc="upper right", markerscale=5)
+    axes.grid(alpha=0.3)
+    share = figure.add_subplot(grid[0, 1])
+    for values, colour in ((before, RAW), (after, CORRECTED)):
+        finite = np.sort(values[np.isfinite(values)])
+        share.plot(finite, 100 * np.arange(1, len(finite) + 1) / len(finite), color=colour)
+    share.set(xlabel="horizontal error [m]", ylabel="fixes with less [%]", xlim=(0, reach), ylim=(0, 100))
+    share.grid(alpha=0.3)
+    return figure

@@ -21,18 +21,12 @@ def display_unit(triad: Triad) -> tuple[float, str]:
     return _DISPLAY[triad.unit]
 
 
-def symmetric_sigma(
-    cov: NDArray[np.float64], rotation: NDArray[np.float64] | None = None
-) -> NDArray[np.float64]:
-    """Deviations of the entries of a symmetric W or of rotation @ W. cov: (9, 9), W's are the last six."""
-    jacobian = np.zeros((9, 6))
+def symmetric_sigma(cov: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Deviations of the entries of a symmetric matrix, (3, 3). cov: (9, 9), the matrix's are the last six."""
+    out = np.zeros((3, 3))
     for k, (i, j) in enumerate(_ENTRIES):
-        entry = np.zeros((3, 3))
-        entry[i, j] = entry[j, i] = 1
-        jacobian[:, k] = (entry if rotation is None else rotation @ entry).ravel()
-    variance = np.einsum("ij,jk,ik->i", jacobian, cov[3:, 3:], jacobian)
-    sigma: NDArray[np.float64] = np.sqrt(np.maximum(variance, 0)).reshape(3, 3)
-    return sigma
+        out[i, j] = out[j, i] = np.sqrt(max(cov[3 + k, 3 + k], 0.0))
+    return out
 
 
 def quality_of(
