@@ -2,6 +2,7 @@
 
 #include <fstream>
 #include <sstream>
+#include <tuple>
 
 #include "libloc/core/check.hpp"
 
@@ -24,27 +25,46 @@ void set_date(const std::string& text, NmeaFixOptions& options) {
   options.reference_date = date;
 }
 
-void set_list(const std::string& path, NmeaFixOptions& options) {
+// Kept up to date by the system (package tzdata), long after this program was built.
+constexpr const char* kSystemList = "/usr/share/zoneinfo/leap-seconds.list";
+
+LeapSeconds read_list(const std::string& path) {
   std::ifstream file(path);
   std::ostringstream text;
   text << file.rdbuf();
-  if (!file) throw CLI::ValidationError("--leap-seconds-list", path + " cannot be read");
+  if (!file) throw DataError("cannot be read");
+  return LeapSeconds::from_list(text.str());
+}
+
+void set_list(const std::string& path, NmeaFixOptions& options) {
   try {
-    options.leap_seconds = LeapSeconds::from_list(text.str());
+    options.leap_seconds = read_list(path);
   } catch (const DataError& error) {
     throw CLI::ValidationError("--leap-seconds-list", path + ": " + error.what());
   }
 }
 
+LeapSeconds newest_table() {
+  try {
+    const LeapSeconds of_system = read_list(kSystemList);
+    const auto day = [](const CivilDate& d) { return std::tuple(d.year, d.month, d.day); };
+    if (day(of_system.known_until()) > day(default_leap_seconds().known_until())) return of_system;
+  } catch (const DataError&) {
+    // None there, or none that can be read: the program's own is as good as before.
+  }
+  return default_leap_seconds();
+}
+
 void add_fix_options(CLI::App& source, NmeaFixOptions& fix) {
+  fix.leap_seconds = newest_table();
   CLI::Option* constant = source.add_option_function<int>(
       "--leap-seconds", [&fix](int seconds) { fix.leap_seconds = LeapSeconds::constant(seconds); },
-      "GPS time minus UTC [s], instead of the table that comes with the program");
+      "GPS time minus UTC [s], instead of the table (the program's or the system's, whichever is newer)");
   constant->check(CLI::Range(0, 255));
   source
       .add_option_function<std::string>(
           "--leap-seconds-list", [&fix](const std::string& path) { set_list(path, fix); },
-          "A newer table: leap-seconds.list, as in /usr/share/zoneinfo")
+          "Another table: leap-seconds.list, as in /usr/share/zoneinfo")
       ->excludes(constant);
   source.add_flag("--accept-not-measured", fix.accept_not_measured,
                   "Take dead-reckoned, manual and simulator positions for fixes");
