@@ -421,20 +421,19 @@ Stillness find_stillness(std::span<const TimeNs> times_ns, const TriadRows& gyro
   return out;
 }
 
-StillnessDetector::StillnessDetector(const RestNoise& gyroscope, const RestNoise& accelerometer, double rate_hz,
-                                     int window_samples, const StillnessOptions& options,
-                                     const Eigen::Vector3d& gyroscope_bias)
+StillnessDetector::StillnessDetector(RestNoise gyroscope, RestNoise accelerometer, double rate_hz, int window_samples,
+                                     const StillnessOptions& options, Eigen::Vector3d gyroscope_bias)
     : options_(options),
-      gyroscope_(gyroscope),
-      accelerometer_(accelerometer),
-      gyroscope_bias_(gyroscope_bias),
+      gyroscope_(std::move(gyroscope)),
+      accelerometer_(std::move(accelerometer)),
+      gyroscope_bias_(std::move(gyroscope_bias)),
       gap_s_(options.gap_periods / rate_hz),
       gyroscope_window_(window_samples),
       accelerometer_window_(window_samples) {
   options.check();
   require_positive("rate_hz", rate_hz);
-  require(gyroscope.known() || accelerometer.known(), "the noise at rest of neither sensor is known");
-  for (const RestNoise* noise : {&gyroscope, &accelerometer}) {
+  require(gyroscope_.known() || accelerometer_.known(), "the noise at rest of neither sensor is known");
+  for (const RestNoise* noise : {&gyroscope_, &accelerometer_}) {
     for (const double v : noise->variance) require(std::isnan(v) || v > 0, "variance", v, "must be positive, or NaN");
   }
 }

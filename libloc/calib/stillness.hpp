@@ -111,9 +111,9 @@ class StillnessDetector {
   /// @param window_samples, gyroscope, accelerometer as find_stillness() gives them; one sensor may be unknown.
   /// @param gyroscope_bias [unit of the gyroscope] at rest, checked against turning_sigmas; NaN: not checked
   /// @throws std::invalid_argument
-  StillnessDetector(const RestNoise& gyroscope, const RestNoise& accelerometer, double rate_hz, int window_samples,
+  StillnessDetector(RestNoise gyroscope, RestNoise accelerometer, double rate_hz, int window_samples,
                     const StillnessOptions& options = {},
-                    const Eigen::Vector3d& gyroscope_bias = Eigen::Vector3d::Constant(kUnknown));
+                    Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Constant(kUnknown));
 
   /// Takes a sample and says whether the device is still. Samples that are not finite or not later than the one before
   /// are counted and change nothing; a gap empties the window. A sensor whose noise is unknown is not looked at.
