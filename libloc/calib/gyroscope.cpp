@@ -106,7 +106,7 @@ Biases segment_biases(std::span<const StillSegment> segments) {
     }
   }
   for (const StillSegment& s : segments) {
-    b.cov.push_back(b.sample_cov / static_cast<double>(s.samples) + Eigen::Matrix3d(wander.asDiagonal()));
+    b.cov.emplace_back(b.sample_cov / static_cast<double>(s.samples) + Eigen::Matrix3d(wander.asDiagonal()));
   }
   return b;
 }
