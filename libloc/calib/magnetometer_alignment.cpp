@@ -469,7 +469,13 @@ TriadCalibration aligned(const TriadCalibration& magnetometer, const Magnetomete
   out.matrix = alignment.matrix * magnetometer.matrix;
   if (out.quality) {
     TriadQuality& q = *out.quality;
-    q.matrix_sigma = (alignment.matrix.cwiseAbs2() * q.matrix_sigma.cwiseAbs2()).cwiseSqrt();
+    Eigen::Matrix3d variance = alignment.matrix.cwiseAbs2() * q.matrix_sigma.cwiseAbs2();
+    // The rotation's own uncertainty: column w of the calibration moves by matrix (theta x w).
+    for (int column = 0; column < 3 && alignment.cov.allFinite(); ++column) {
+      const Eigen::Matrix3d d_theta = alignment.matrix * so3::hat(magnetometer.matrix.col(column));
+      variance.col(column) += (d_theta * alignment.cov * d_theta.transpose()).diagonal();
+    }
+    q.matrix_sigma = variance.cwiseSqrt();
     q.verdict = std::max(q.verdict, alignment.quality.verdict);
     q.reasons.insert(q.reasons.end(), alignment.quality.reasons.begin(), alignment.quality.reasons.end());
   }

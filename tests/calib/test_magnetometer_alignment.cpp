@@ -226,6 +226,25 @@ TEST(MagnetometerAlignment, GoesIntoTheRig) {
   EXPECT_TRUE(test::near(aligned(triad, a).apply({2, 2, 3}), Eigen::Vector3d(0, 2, 0), 1e-12));
 }
 
+TEST(MagnetometerAlignment, TheRigsDeviationsHoldTheRotationsOwn) {
+  TriadCalibration triad;
+  triad.matrix << 1, 0.2, 0.1, 0.3, 0.9, -0.1, 0, 0.2, 1.1;
+  triad.quality.emplace().matrix_sigma.setZero();
+  MagnetometerAlignment a;
+  a.solved = true;
+  a.matrix = so3::exp({0.3, -1, 2}).toRotationMatrix();
+  const Eigen::Vector3d sigma(0.01, 0.02, 0.03);
+  a.cov = sigma.cwiseAbs2().asDiagonal();
+  Eigen::Matrix3d variance = Eigen::Matrix3d::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const auto turned = [&](double angle) -> Eigen::Matrix3d {
+      return a.matrix * so3::exp(angle * Eigen::Vector3d::Unit(k)).toRotationMatrix() * triad.matrix;
+    };
+    variance += ((turned(1e-6) - turned(-1e-6)) / 2e-6 * sigma(k)).cwiseAbs2();
+  }
+  EXPECT_TRUE(test::near(aligned(triad, a).quality->matrix_sigma, variance.cwiseSqrt().eval(), 1e-9));
+}
+
 // The magnetometer of BROAD's device, as it is and turned by a known rotation.
 TEST(MagnetometerAlignmentReal, Broad) {
   LOC_DATA_OR_SKIP(folder, "broad");

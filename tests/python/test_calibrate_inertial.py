@@ -249,7 +249,7 @@ def test_gps_latency_needs_fixes_and_a_reference(tmp_path, capsys):
     assert "no GPS fix" in run(capsys, "gps-latency", tmp_path / "own.csv", code=1)
     with LogWriter(tmp_path / "gps.lcm") as log:
         fix = loc.gps_fix_t()
-        fix.time_ns, fix.fix = 10**18, 3
+        fix.time_ns, fix.fix_type = 10**18, 3
         log.write("LOC_GPS", fix, 10**15)
     assert "no reference trajectory" in run(capsys, "gps-latency", tmp_path / "gps.lcm", code=1)
 
