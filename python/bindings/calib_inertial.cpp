@@ -143,7 +143,8 @@ void bind_stillness(py::module_& m) {
         const py::gil_scoped_release release;
         return loc::find_stillness(t, g, a, options);
       },
-      py::arg("times_ns"), py::arg("gyroscope"), py::arg("accelerometer"), py::arg("options") = StillnessOptions{},
+      py::arg("times_ns"), py::arg("gyroscope"), py::arg("accelerometer"),
+      py::arg_v("options", StillnessOptions{}, "StillnessOptions()"),
       "Still segments of a recording of any unit: int64 (N,) times, float64 (N, 3) readings; one sensor may be None. "
       "Bad data do not raise: see Stillness.quality.");
 
@@ -155,7 +156,7 @@ void bind_stillness(py::module_& m) {
              return loc::StillnessDetector(gyro, accel, rate_hz, window_samples, options, b);
            }),
            py::arg("gyroscope"), py::arg("accelerometer"), py::arg("rate_hz"), py::arg("window_samples"),
-           py::arg("options") = StillnessOptions{}, py::arg("gyroscope_bias") = py::none())
+           py::arg_v("options", StillnessOptions{}, "StillnessOptions()"), py::arg("gyroscope_bias") = py::none())
       .def(
           "update",
           [](loc::StillnessDetector& self, loc::TimeNs time_ns, const ArrayLike& gyro, const ArrayLike& accel) {
@@ -245,7 +246,7 @@ void bind_accelerometer(py::module_& m) {
       [](const std::vector<StillSegment>& segments, const AccelerometerOptions& options) {
         return loc::fit_accelerometer(loc::accelerometer_poses(segments), options);
       },
-      py::arg("segments"), py::arg("options") = AccelerometerOptions{},
+      py::arg("segments"), py::arg_v("options", AccelerometerOptions{}, "AccelerometerOptions()"),
       "Nine parameters from the accelerometer's means in still segments. Bad data do not raise: see quality.");
   m.def(
       "fit_accelerometer_poses",
@@ -262,7 +263,8 @@ void bind_accelerometer(py::module_& m) {
         }
         return loc::fit_accelerometer(poses, options);
       },
-      py::arg("means"), py::arg("sigmas") = py::none(), py::arg("options") = AccelerometerOptions{},
+      py::arg("means"), py::arg("sigmas") = py::none(),
+      py::arg_v("options", AccelerometerOptions{}, "AccelerometerOptions()"),
       "The same from float64 (P, 3) means of still poses; sigmas (P,): deviation of each mean, raw units.");
 }
 
@@ -337,7 +339,7 @@ void bind_gyroscope(py::module_& m) {
         return loc::fit_gyroscope(t, g, segments, accelerometer, options);
       },
       py::arg("times_ns"), py::arg("gyroscope"), py::arg("segments"), py::arg("accelerometer"),
-      py::arg("options") = GyroscopeOptions{},
+      py::arg_v("options", GyroscopeOptions{}, "GyroscopeOptions()"),
       "Bias, scale and misalignment from the turns between the still segments of the same recording.");
   m.def(
       "fit_gyroscope_bias", [](const std::vector<StillSegment>& segments) { return loc::fit_gyroscope_bias(segments); },
@@ -390,7 +392,7 @@ void bind_allan(py::module_& m) {
         const py::gil_scoped_release release;
         return loc::allan_fit(v, rate_hz, options);
       },
-      py::arg("values"), py::arg("rate_hz"), py::arg("options") = AllanOptions{},
+      py::arg("values"), py::arg("rate_hz"), py::arg_v("options", AllanOptions{}, "AllanOptions()"),
       "float64 (N,) at a constant rate, the sensor at rest. DataError names a value that is not finite.");
 
   py::class_<ImuAllan>(m, "ImuAllan", "Allan deviation of all axes, from the longest part without motion and gaps.")
@@ -424,8 +426,9 @@ void bind_allan(py::module_& m) {
         const py::gil_scoped_release release;
         return loc::analyse_imu_noise(t, g, a, options, stillness);
       },
-      py::arg("times_ns"), py::arg("gyroscope"), py::arg("accelerometer"), py::arg("options") = AllanOptions{},
-      py::arg("stillness") = StillnessOptions{},
+      py::arg("times_ns"), py::arg("gyroscope"), py::arg("accelerometer"),
+      py::arg_v("options", AllanOptions{}, "AllanOptions()"),
+      py::arg_v("stillness", StillnessOptions{}, "StillnessOptions()"),
       "int64 (N,); float64 (N, 3) [rad/s] and [m/s^2], one may be None. Bad data do not raise: see quality.");
   py::class_<loc::ImuNoiseFit>(m, "ImuNoiseFit", "Noise for the estimators, and where each field is from.")
       .def_readonly("noise", &loc::ImuNoiseFit::noise)
@@ -433,7 +436,7 @@ void bind_allan(py::module_& m) {
           "measured", [](const loc::ImuNoiseFit& self) { return self.measured; },
           "names of the fields that the recording determines")
       .def_readonly("quality", &loc::ImuNoiseFit::quality);
-  m.def("imu_noise_from", &loc::imu_noise_from, py::arg("allan"), py::arg("fallback") = loc::ImuNoise{},
+  m.def("imu_noise_from", &loc::imu_noise_from, py::arg("allan"), py::arg_v("fallback", loc::ImuNoise{}, "ImuNoise()"),
         "What was not identified keeps the fallback's value, or the upper bound where that is lower.");
 }
 
@@ -512,7 +515,7 @@ void bind_magnetometer(py::module_& m) {
         return loc::align_magnetometer(t, g, acc, field, options);
       },
       py::arg("times_ns"), py::arg("gyroscope"), py::arg("accelerometer"), py::arg("magnetometer"),
-      py::arg("options") = MagnetometerAlignmentOptions{},
+      py::arg_v("options", MagnetometerAlignmentOptions{}, "MagnetometerAlignmentOptions()"),
       "Rotation from a calibrated magnetometer (any unit) to the IMU: int64 (N,), float64 (N, 3) [rad/s], [m/s^2] or "
       "None. A slower magnetometer repeats its reading or is NaN in between. Bad data do not raise: see quality.");
   m.def("aligned", &loc::aligned, py::arg("magnetometer"), py::arg("alignment"),

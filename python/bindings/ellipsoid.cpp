@@ -118,7 +118,8 @@ void bind_fit(py::module_& m) {
         const py::gil_scoped_release release;
         return loc::fit_ellipsoid(rows, options, w);
       },
-      py::arg("readings"), py::arg("options") = EllipsoidOptions{}, py::arg("weights") = py::none(),
+      py::arg("readings"), py::arg_v("options", EllipsoidOptions{}, "EllipsoidOptions()"),
+      py::arg("weights") = py::none(),
       "Fits an ellipsoid to float64 (N, 3) readings of any unit; weights (N,): information of a reading relative to "
       "the "
       "others. Bad data do not raise: see EllipsoidFit.quality.");
@@ -137,7 +138,7 @@ void bind_collector(py::module_& m) {
   py::class_<EllipsoidCollector>(m, "EllipsoidCollector",
                                  "Collects readings in bounded memory for a calibration that a person watches. Each "
                                  "direction keeps its latest readings.")
-      .def(py::init<EllipsoidOptions, int>(), py::arg("options") = EllipsoidOptions{},
+      .def(py::init<EllipsoidOptions, int>(), py::arg_v("options", EllipsoidOptions{}, "EllipsoidOptions()"),
            py::arg("readings_per_cell") = 20)
       .def(
           "add",

@@ -9,7 +9,7 @@ import numpy.typing
 import os
 import typing
 from . import so3
-__all__: list[str] = ['AbsoluteError', 'Alignment', 'Association', 'CameraCalibration', 'Consistency', 'DataError', 'DiscreteImuNoise', 'DistortionModel', 'ESTIMATE_CHANNEL', 'ErrorStatistics', 'Estimate', 'EstimateStatus', 'EstimateValid', 'GPS_CHANNEL', 'GpsArrays', 'GpsCalibration', 'GpsFixType', 'GpsMeasurement', 'IMAGE_CHANNEL', 'IMU_CHANNEL', 'ImageMeasurement', 'ImuArrays', 'ImuCalibration', 'ImuMeasurement', 'ImuNoise', 'LcmLogReader', 'MAGNETOMETER_CHANNEL', 'MadgwickFilter', 'MadgwickOptions', 'MadgwickResult', 'MagnetometerArrays', 'MagnetometerCalibration', 'MagnetometerMeasurement', 'MeasurementSource', 'OrientationError', 'Pose3', 'REFERENCE_CHANNEL', 'Random', 'Recording', 'ReferenceArrays', 'ReferenceMeasurement', 'RelativeError', 'Rig', 'SOURCE_STATUS_CHANNEL', 'STATISTICS_CHANNEL', 'Trajectory', 'TriadCalibration', 'absolute_error', 'align_points', 'associate', 'average_consistency', 'beta_from_gyro', 'chi_square_cdf', 'chi_square_quantile', 'discretise', 'error_statistics', 'format_seconds', 'message_fingerprints', 'message_type', 'normalised_error_squared', 'open_broad', 'open_csv', 'open_euroc', 'open_lcm_log', 'orientation_error', 'parse_seconds', 'quantile', 'read_any_rig', 'read_rig', 'read_tum', 'relative_error', 'root_mean_square', 'so3', 'write_rig', 'write_tum']
+__all__: list[str] = ['AbsoluteError', 'AccelerometerFit', 'AccelerometerOptions', 'Alignment', 'AllanFit', 'AllanOptions', 'AllanTerm', 'Association', 'CameraCalibration', 'ClockCalibration', 'ClockCalibrationResult', 'ClockChain', 'ClockLine', 'ClockModel', 'Consistency', 'CounterUnwrapper', 'DataError', 'DiscreteImuNoise', 'DistortionModel', 'ESTIMATE_CHANNEL', 'EllipsoidAdvice', 'EllipsoidCollector', 'EllipsoidFit', 'EllipsoidOptions', 'ErrorStatistics', 'Estimate', 'EstimateStatus', 'EstimateValid', 'GPS_CHANNEL', 'GpsArrays', 'GpsCalibration', 'GpsClock', 'GpsFixType', 'GpsMeasurement', 'GyroscopeFit', 'GyroscopeOptions', 'IMAGE_CHANNEL', 'IMU_CHANNEL', 'ImageMeasurement', 'ImuAllan', 'ImuArrays', 'ImuCalibration', 'ImuMeasurement', 'ImuNoise', 'ImuNoiseFit', 'LcmLogReader', 'MAGNETOMETER_CHANNEL', 'MadgwickFilter', 'MadgwickOptions', 'MadgwickResult', 'MagnetometerAlignment', 'MagnetometerAlignmentOptions', 'MagnetometerArrays', 'MagnetometerCalibration', 'MagnetometerMeasurement', 'MeasurementSource', 'NO_TIME', 'NmeaFixes', 'OrientationError', 'Pose3', 'Quality', 'REFERENCE_CHANNEL', 'Random', 'Recording', 'ReferenceArrays', 'ReferenceMeasurement', 'RelativeError', 'RestNoise', 'Rig', 'SOURCE_STATUS_CHANNEL', 'STATISTICS_CHANNEL', 'StillSegment', 'Stillness', 'StillnessDetector', 'StillnessOptions', 'TimeOffsetResult', 'Trajectory', 'TriadCalibration', 'TriadQuality', 'Verdict', 'absolute_error', 'align_magnetometer', 'align_points', 'aligned', 'allan_fit', 'analyse_imu_noise', 'associate', 'average_consistency', 'beta_from_gyro', 'calibrate_clock', 'chi_square_cdf', 'chi_square_quantile', 'discretise', 'error_statistics', 'estimate_time_offset', 'find_stillness', 'fit_accelerometer', 'fit_accelerometer_poses', 'fit_ellipsoid', 'fit_gyroscope', 'fit_gyroscope_bias', 'format_seconds', 'gps_from_unix', 'imu_noise_from', 'leap_seconds_known_until', 'local_positions', 'message_fingerprints', 'message_type', 'normalised_error_squared', 'open_broad', 'open_csv', 'open_euroc', 'open_lcm_log', 'open_nmea', 'orientation_error', 'parse_nmea', 'parse_seconds', 'quantile', 'read_any_rig', 'read_rig', 'read_tum', 'relative_error', 'root_mean_square', 'simulate_clock', 'simulate_gps_time', 'so3', 'unix_from_gps', 'update_rig', 'write_rig', 'write_tum']
 class DataError(ValueError):
     """
     What is wrong in a file or message: where (file, line or byte), which field, which value.
@@ -491,6 +491,93 @@ class ImageMeasurement:
     @property
     def width_px(self) -> int:
         ...
+class Verdict(enum.IntEnum):
+    """
+    What a calibration says about itself, from best to worst. REFUSED: not to be used unless the user insists.
+    """
+    FAIR: typing.ClassVar[Verdict]
+    OK: typing.ClassVar[Verdict]
+    REFUSED: typing.ClassVar[Verdict]
+    WARN: typing.ClassVar[Verdict]
+    @classmethod
+    def __new__(cls, value):
+        ...
+    def __format__(self, format_spec):
+        ...
+class Quality:
+    """
+    Verdict of a calibration on itself, and why.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def reasons(self) -> list[str]:
+        """
+        complete sentences; empty when all is well
+        """
+    @property
+    def usable(self) -> bool:
+        """
+        False when refused
+        """
+    @property
+    def verdict(self) -> Verdict:
+        ...
+class TriadQuality:
+    """
+    How a triad's calibration was found, and how far it may be trusted. A deviation that was not estimated is NaN.
+    """
+    verdict: Verdict
+    def __init__(self) -> None:
+        ...
+    @property
+    def bias_sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        deviation of the bias (3,), in its unit
+        """
+    @bias_sigma.setter
+    def bias_sigma(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def matrix_sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        deviation of each entry (3, 3)
+        """
+    @matrix_sigma.setter
+    def matrix_sigma(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def method(self) -> str:
+        """
+        "robust", "still-poses", ...
+        """
+    @method.setter
+    def method(self, arg0: str) -> None:
+        ...
+    @property
+    def reasons(self) -> list[str]:
+        """
+        Copies of the sentences, one line each: assign a list to change them.
+        """
+    @reasons.setter
+    def reasons(self, arg1: collections.abc.Sequence[str]) -> None:
+        ...
+    @property
+    def residual_rms(self) -> float:
+        """
+        of the norm, relative to the field's norm
+        """
+    @residual_rms.setter
+    def residual_rms(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def samples(self) -> int:
+        """
+        readings (of still poses: poses) that were used
+        """
+    @samples.setter
+    def samples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
 class TriadCalibration:
     """
     corrected = matrix @ (raw - bias)
@@ -512,6 +599,14 @@ class TriadCalibration:
         """
     @matrix.setter
     def matrix(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def quality(self) -> TriadQuality | None:
+        """
+        How it was found; None when nobody has said.
+        """
+    @quality.setter
+    def quality(self, arg0: TriadQuality | None) -> None:
         ...
 class ImuCalibration:
     """
@@ -537,6 +632,14 @@ class ImuCalibration:
     def gyroscope(self, arg0: TriadCalibration) -> None:
         ...
     @property
+    def noise_measured(self) -> list[str]:
+        """
+        Copies of the names of the fields of noise that were measured; the others are guesses.
+        """
+    @noise_measured.setter
+    def noise_measured(self, arg1: collections.abc.Sequence[str]) -> None:
+        ...
+    @property
     def rate_hz(self) -> float:
         """
         nominal; 0 when unknown
@@ -560,7 +663,7 @@ class MagnetometerCalibration:
         ...
 class GpsCalibration:
     """
-    Where the antenna is.
+    Where the antenna is, and how late its fixes are stamped.
     """
     def __init__(self) -> None:
         ...
@@ -571,6 +674,22 @@ class GpsCalibration:
         """
     @antenna_in_body.setter
     def antenna_in_body(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def time_offset_s(self) -> float:
+        """
+        t_imu = t_gps + time_offset_s
+        """
+    @time_offset_s.setter
+    def time_offset_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def time_offset_sigma_s(self) -> float:
+        """
+        its deviation; NaN: not measured
+        """
+    @time_offset_sigma_s.setter
+    def time_offset_sigma_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
 class DistortionModel(enum.Enum):
     """
@@ -635,6 +754,70 @@ class CameraCalibration:
     @width_px.setter
     def width_px(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
+class ClockCalibration:
+    """
+    What is known of the clock that stamps a stream. A figure that is not known is NaN.
+    """
+    def __init__(self, stream: str, reference: str = 'host') -> None:
+        ...
+    def check(self) -> None:
+        """
+        ValueError names the stream and the field.
+        """
+    @property
+    def jitter_p99_s(self) -> float:
+        """
+        99 % of arrivals are at most that late [s]
+        """
+    @jitter_p99_s.setter
+    def jitter_p99_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def jitter_rms_s(self) -> float:
+        """
+        of arrivals after the earliest possible (the lower envelope) [s]
+        """
+    @jitter_rms_s.setter
+    def jitter_rms_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def offset_sigma_s(self) -> float:
+        """
+        deviation of a time that was put on the reference clock [s]
+        """
+    @offset_sigma_s.setter
+    def offset_sigma_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def reference(self) -> str:
+        """
+        the clock it was compared with: "host", "gps"
+        """
+    @reference.setter
+    def reference(self, arg0: str) -> None:
+        ...
+    @property
+    def skew_ppm(self) -> float:
+        """
+        seconds of the reference per second of the stream's clock, less 1 [1e-6]
+        """
+    @skew_ppm.setter
+    def skew_ppm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def skew_sigma_ppm(self) -> float:
+        ...
+    @skew_sigma_ppm.setter
+    def skew_sigma_ppm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def stream(self) -> str:
+        """
+        "imu", "gps", a camera's name, ...
+        """
+    @stream.setter
+    def stream(self, arg0: str) -> None:
+        ...
 class Rig:
     """
     The sensors of one device; the body frame is the IMU's. A sensor that is absent is None.
@@ -652,6 +835,10 @@ class Rig:
         """
         ValueError names a field that is out of range.
         """
+    def doubts(self) -> list[tuple[str, Verdict, str]]:
+        """
+        (block, verdict, sentence) for each calibration that was refused and written all the same, or came with a warning.
+        """
     @property
     def cameras(self) -> list[CameraCalibration]:
         """
@@ -659,6 +846,14 @@ class Rig:
         """
     @cameras.setter
     def cameras(self, arg1: collections.abc.Sequence[CameraCalibration]) -> None:
+        ...
+    @property
+    def clocks(self) -> list[ClockCalibration]:
+        """
+        Copies of the clocks: assign a list to change them.
+        """
+    @clocks.setter
+    def clocks(self, arg1: collections.abc.Sequence[ClockCalibration]) -> None:
         ...
 class MadgwickOptions:
     """
@@ -1129,6 +1324,1234 @@ class MadgwickFilter:
         """
         of the last IMU step
         """
+class EllipsoidOptions:
+    """
+    How an ellipsoid is fitted, and where the verdicts change.
+    """
+    def __init__(self, *, method: str = 'robust', reference_norm: typing.SupportsFloat | typing.SupportsIndex = 0.0, shape_prior_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.2, tukey_c: typing.SupportsFloat | typing.SupportsIndex = 4.685, outlier_share: typing.SupportsFloat | typing.SupportsIndex = 0.02, max_iterations: typing.SupportsInt | typing.SupportsIndex = 100, seed: typing.SupportsInt | typing.SupportsIndex = 1, ok_centre_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.003, fair_centre_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.01, warn_centre_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.02) -> None:
+        """
+        method: 'lsq', 'robust', 'als' or 'sphere'. ValueError names a field that is out of range.
+        """
+    @property
+    def fair_centre_sigma(self) -> float:
+        """
+        … fair
+        """
+    @property
+    def max_iterations(self) -> int:
+        ...
+    @property
+    def method(self) -> str:
+        ...
+    @property
+    def ok_centre_sigma(self) -> float:
+        """
+        largest predicted deviation of the centre over the radius that is ok
+        """
+    @property
+    def outlier_share(self) -> float:
+        """
+        robust: above this share the start is the least median of squares
+        """
+    @property
+    def reference_norm(self) -> float:
+        """
+        norm of corrected readings, in the unit wanted; 0: the readings' own mean radius
+        """
+    @property
+    def seed(self) -> int:
+        """
+        of the subsets of the least median of squares
+        """
+    @property
+    def shape_prior_sigma(self) -> float:
+        """
+        robust: deviation of the relative axis lengths from a sphere; 0: no prior
+        """
+    @property
+    def tukey_c(self) -> float:
+        """
+        residuals beyond this many sigma do not count
+        """
+    @property
+    def warn_centre_sigma(self) -> float:
+        """
+        … a warning; beyond: refused
+        """
+class EllipsoidFit:
+    """
+    corrected = matrix @ (raw - centre), of norm reference_norm. matrix is symmetric: a rotation is not observable from norms. Look at quality before using it.
+    """
+    def triad(self) -> TriadCalibration:
+        """
+        For the rig, with its quality. DataError with the reasons when there is none.
+        """
+    @property
+    def axis_ratio(self) -> float:
+        """
+        longest over shortest axis
+        """
+    @property
+    def cells_hit(self) -> int:
+        ...
+    @property
+    def centre(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,), in the readings' unit
+        """
+    @property
+    def centre_over_radius(self) -> float:
+        """
+        |centre| / radius
+        """
+    @property
+    def centre_sigma(self) -> float:
+        """
+        largest deviation of the centre in any direction, over the radius
+        """
+    @property
+    def converged(self) -> bool:
+        ...
+    @property
+    def cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (9, 9) covariance of centre x, y, z and matrix xx, yy, zz, xy, xz, yz
+        """
+    @property
+    def coverage(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        (10, 10) int32: readings in cells of equal area; rows from -z up, columns from +x towards +y
+        """
+    @property
+    def inliers(self) -> int:
+        ...
+    @property
+    def is_ellipsoid(self) -> bool:
+        """
+        False: the readings determine none
+        """
+    @property
+    def iterations(self) -> int:
+        ...
+    @property
+    def matrix(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 3), symmetric
+        """
+    @property
+    def method(self) -> str:
+        ...
+    @property
+    def noise_sigma(self) -> float:
+        """
+        of a reading across the surface, in the readings' unit
+        """
+    @property
+    def norm_variation_after(self) -> float:
+        """
+        of |corrected|, all readings
+        """
+    @property
+    def norm_variation_before(self) -> float:
+        """
+        of |raw|: deviation over mean
+        """
+    @property
+    def not_finite(self) -> int:
+        """
+        left out
+        """
+    @property
+    def quality(self) -> Quality:
+        ...
+    @property
+    def radius(self) -> float:
+        """
+        geometric mean of the half axes, in the readings' unit
+        """
+    @property
+    def readings(self) -> int:
+        """
+        taken
+        """
+    @property
+    def reference_norm(self) -> float:
+        ...
+    @property
+    def residual_rms(self) -> float:
+        """
+        of the corrected norm over the inliers, relative
+        """
+class EllipsoidAdvice:
+    """
+    What to do next while readings are collected.
+    """
+    @property
+    def enough(self) -> bool:
+        ...
+    @property
+    def missing_direction(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) in the sensor's axes, of length 1: point it along the field; NaN when there is none
+        """
+    @property
+    def text(self) -> str:
+        """
+        in words
+        """
+    @property
+    def turn_axis(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) in the sensor's axes, of length 1: turn about it to get there
+        """
+class EllipsoidCollector:
+    """
+    Collects readings in bounded memory for a calibration that a person watches. Each direction keeps its latest readings.
+    """
+    def __init__(self, options: EllipsoidOptions = ..., readings_per_cell: typing.SupportsInt | typing.SupportsIndex = 20) -> None:
+        ...
+    def add(self, reading: numpy.typing.ArrayLike) -> bool:
+        """
+        False when it is not finite: counted and left out.
+        """
+    def advice(self, fit: EllipsoidFit) -> EllipsoidAdvice:
+        ...
+    def fit(self) -> EllipsoidFit:
+        """
+        Of what is kept now.
+        """
+    @property
+    def kept(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3): the readings that fit() uses, in order of arrival
+        """
+    @property
+    def received(self) -> int:
+        ...
+class ClockLine:
+    """
+    One clock in terms of another: output = output_ref + (input - input_ref) * (1 + skew).
+    """
+    def convert(self, input_ns: numpy.typing.NDArray[numpy.int64]) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        (times_ns, sigma_ns) of int64 (N,); also outside the span, where sigma grows.
+        """
+    def inverse(self) -> ClockLine:
+        """
+        The line from output to input.
+        """
+    @property
+    def input_ref_ns(self) -> int:
+        ...
+    @property
+    def offset_ns(self) -> int:
+        """
+        output - input at the reference
+        """
+    @property
+    def output_ref_ns(self) -> int:
+        ...
+    @property
+    def sigma_ns(self) -> float:
+        """
+        standard deviation of the output at input_ref_ns
+        """
+    @property
+    def sigma_skew(self) -> float:
+        ...
+    @property
+    def skew(self) -> float:
+        """
+        relative frequency error; 1e-6 is 1 ppm
+        """
+    @property
+    def skew_ppm(self) -> float:
+        ...
+    @property
+    def valid_from_ns(self) -> int:
+        """
+        span of the input for which the line holds
+        """
+    @property
+    def valid_to_ns(self) -> int:
+        ...
+class ClockModel:
+    """
+    Device clock to host clock, from stamps and arrivals: a line under a sliding window of samples that are only ever late. Gives true time + minimum delay. Survives resets, jumps, steps, gaps; times never step back.
+    """
+    def __init__(self, **kwargs) -> None:
+        """
+        Options as keywords: window_s=120, skew_sigma_ppm=100, initial_sigma_ns=10_000_000, skew_walk=1.5e-8, min_step_ns=1_000_000, step_samples=20, step_s=5, early_samples=5, reset_samples=3, reset_step_ns=1_000_000_000, max_extrapolation_s=60. ValueError names one that is out of range.
+        """
+    def convert(self, device_times_ns: numpy.typing.NDArray[numpy.int64]) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        Returns (times_ns, sigma_ns): int64 (N,) and float64 (N,); INT64_MIN (libloc.NO_TIME) and NaN where there is no answer.
+        """
+    def process(self, device_times_ns: numpy.typing.NDArray[numpy.int64], host_times_ns: numpy.typing.NDArray[numpy.int64]) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        As live: each sample is taken in, then converted with what is known by then. Returns (times_ns, sigma_ns) as convert().
+        """
+    def reset(self) -> None:
+        """
+        Forgets everything but the counts.
+        """
+    def update(self, device_times_ns: numpy.typing.NDArray[numpy.int64], host_times_ns: numpy.typing.NDArray[numpy.int64]) -> None:
+        """
+        Samples in the order of arrival, int64 (N,) each.
+        """
+    @property
+    def counts(self) -> dict:
+        """
+        What it has survived: a dict.
+        """
+    @property
+    def epoch(self) -> int:
+        """
+        Lines started so far.
+        """
+    @property
+    def line(self) -> ClockLine:
+        """
+        What is known now, a copy.
+        """
+    @property
+    def mean_jitter_ns(self) -> float:
+        ...
+    @property
+    def ready(self) -> bool:
+        ...
+class CounterUnwrapper:
+    """
+    Counters of devices as nanoseconds that do not wrap around. A tick lasts tick_numerator_ns / tick_denominator.
+    """
+    def __init__(self, bits: typing.SupportsInt | typing.SupportsIndex = 32, tick_numerator_ns: typing.SupportsInt | typing.SupportsIndex = 1000, tick_denominator: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
+        ...
+    def unwrap(self, counts: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        int64 (N,) counts in, int64 (N,) nanoseconds out.
+        """
+    @property
+    def wraps(self) -> int:
+        ...
+class ClockCalibrationResult:
+    """
+    What a recording tells about its clock.
+    """
+    @property
+    def counts(self) -> dict:
+        ...
+    @property
+    def duration_s(self) -> float:
+        ...
+    @property
+    def epochs(self) -> int:
+        ...
+    @property
+    def jitter_max_ns(self) -> float:
+        ...
+    @property
+    def jitter_median_ns(self) -> float:
+        ...
+    @property
+    def jitter_p90_ns(self) -> float:
+        ...
+    @property
+    def jitter_p99_ns(self) -> float:
+        ...
+    @property
+    def jitter_rms_ns(self) -> float:
+        """
+        lateness of arrivals
+        """
+    @property
+    def offset_ns(self) -> int:
+        """
+        host - device at the last sample
+        """
+    @property
+    def quality(self) -> Quality:
+        ...
+    @property
+    def rate_hz(self) -> float:
+        ...
+    @property
+    def sigma_ns(self) -> float:
+        """
+        of a time put on the host's clock
+        """
+    @property
+    def skew_max_ppm(self) -> float:
+        ...
+    @property
+    def skew_min_ppm(self) -> float:
+        ...
+    @property
+    def skew_ppm(self) -> float:
+        """
+        mean; seconds of the host per second, less 1
+        """
+    @property
+    def skew_sigma_ppm(self) -> float:
+        """
+        its wandering included
+        """
+class GpsClock:
+    """
+    Host clock to GPS time (without leap seconds), from pulses per second and labels. Without pulses sigma says tens of milliseconds.
+    """
+    def __init__(self, **kwargs) -> None:
+        """
+        Options as keywords: label='previous' or 'next', pulse_gate_ns=100_000_000, pulse_delay_ns=0, sigma_pulse_delay_ns=2000, pairing_delay_ns=400_000_000, label_delay_ns=100_000_000, sigma_label_delay_ns=100_000_000, max_pulse_extrapolation_s=600, max_label_extrapolation_s=60.
+        """
+    def convert(self, host_times_ns: numpy.typing.NDArray[numpy.int64]) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        Returns (times_ns, sigma_ns): int64 (N,) and float64 (N,); INT64_MIN (libloc.NO_TIME) and NaN where there is no answer.
+        """
+    def update(self, is_pulse: numpy.typing.NDArray[numpy.bool], host_times_ns: numpy.typing.NDArray[numpy.int64], gps_times_ns: numpy.typing.NDArray[numpy.int64]) -> None:
+        """
+        Events in the order of arrival: bool (N,); int64 (N,) edge of the pulse or arrival of the label; int64 (N,) GPS time of the label, NO_TIME of a pulse unless its source has paired it.
+        """
+    @property
+    def basis(self) -> str:
+        """
+        'none', 'labels' or 'pulses'
+        """
+    @property
+    def counts(self) -> dict:
+        ...
+    @property
+    def epoch(self) -> int:
+        ...
+    @property
+    def line(self) -> ClockLine | None:
+        """
+        Host to GPS as it is known now; None when it is not.
+        """
+class ClockChain:
+    """
+    Device clock to host clock to GPS time, sigma of both steps.
+    """
+    def __init__(self) -> None:
+        ...
+    def convert(self, device_times_ns: numpy.typing.NDArray[numpy.int64]) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        Returns (times_ns, sigma_ns): int64 (N,) and float64 (N,); INT64_MIN (libloc.NO_TIME) and NaN where there is no answer.
+        """
+    def update(self, device_times_ns: numpy.typing.NDArray[numpy.int64], host_times_ns: numpy.typing.NDArray[numpy.int64]) -> None:
+        ...
+    def update_gps(self, is_pulse: numpy.typing.NDArray[numpy.bool], host_times_ns: numpy.typing.NDArray[numpy.int64], gps_times_ns: numpy.typing.NDArray[numpy.int64]) -> None:
+        """
+        Events in the order of arrival: bool (N,); int64 (N,) edge of the pulse or arrival of the label; int64 (N,) GPS time of the label, NO_TIME of a pulse unless its source has paired it.
+        """
+    @property
+    def device_counts(self) -> dict:
+        ...
+    @property
+    def gps_counts(self) -> dict:
+        ...
+class TimeOffsetResult:
+    """
+    t_reference = t_stream + offset_s
+    """
+    @property
+    def bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        stream - reference [m]
+        """
+    @property
+    def converged(self) -> bool:
+        ...
+    @property
+    def down_weighted(self) -> int:
+        ...
+    @property
+    def lever_arm(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def not_finite(self) -> int:
+        ...
+    @property
+    def offset_s(self) -> float:
+        ...
+    @property
+    def outside(self) -> int:
+        ...
+    @property
+    def quality(self) -> Quality:
+        ...
+    @property
+    def rms_after_m(self) -> float:
+        ...
+    @property
+    def rms_before_m(self) -> float:
+        ...
+    @property
+    def sigma_s(self) -> float:
+        ...
+    @property
+    def speed_deviation(self) -> float:
+        ...
+    @property
+    def speed_rms(self) -> float:
+        ...
+    @property
+    def used(self) -> int:
+        ...
+    @property
+    def velocity_deviation(self) -> float:
+        ...
+class StillnessOptions:
+    """
+    What counts as still. No threshold has a unit.
+    """
+    def __init__(self, *, min_duration_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, window_s: typing.SupportsFloat | typing.SupportsIndex = 0.5, enter_ratio: typing.SupportsFloat | typing.SupportsIndex = 3.0, leave_ratio: typing.SupportsFloat | typing.SupportsIndex = 6.0, min_whiteness: typing.SupportsFloat | typing.SupportsIndex = 0.1, turning_sigmas: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_wander: typing.SupportsFloat | typing.SupportsIndex = 4.0, gap_periods: typing.SupportsFloat | typing.SupportsIndex = 5.0) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    @property
+    def enter_ratio(self) -> float:
+        """
+        variance over the noise's: stillness begins below
+        """
+    @property
+    def gap_periods(self) -> float:
+        """
+        a longer pause ends a segment
+        """
+    @property
+    def leave_ratio(self) -> float:
+        """
+        and ends above
+        """
+    @property
+    def max_wander(self) -> float:
+        """
+        mean square step from window to window over what the noise makes; 0: off
+        """
+    @property
+    def min_duration_s(self) -> float:
+        """
+        shorter segments are left out
+        """
+    @property
+    def min_whiteness(self) -> float:
+        """
+        of the quietest windows; 0: not judged
+        """
+    @property
+    def turning_sigmas(self) -> float:
+        """
+        mean rate off the median of all segments, in deviations of a sample; 0: off
+        """
+    @property
+    def window_s(self) -> float:
+        """
+        over which the variance is taken
+        """
+class RestNoise:
+    """
+    Noise of one sensor at rest, that stillness is measured against.
+    """
+    @property
+    def known(self) -> bool:
+        ...
+    @property
+    def quantum(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) smallest step of the readings
+        """
+    @property
+    def variance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) of a sample; NaN: axis without information
+        """
+    @property
+    def whiteness(self) -> float:
+        """
+        of the quietest windows: 1 for white noise
+        """
+class StillSegment:
+    """
+    One still part of a recording. An absent sensor's figures are NaN.
+    """
+    @property
+    def accelerometer_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 3), of a sample
+        """
+    @property
+    def accelerometer_mean(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,)
+        """
+    @property
+    def begin(self) -> int:
+        """
+        first row
+        """
+    @property
+    def duration_s(self) -> float:
+        ...
+    @property
+    def end(self) -> int:
+        """
+        one past the last row
+        """
+    @property
+    def end_ns(self) -> int:
+        """
+        of the last row in it
+        """
+    @property
+    def gyroscope_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 3), of a sample
+        """
+    @property
+    def gyroscope_mean(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,)
+        """
+    @property
+    def samples(self) -> int:
+        """
+        taken
+        """
+    @property
+    def start_ns(self) -> int:
+        ...
+class Stillness:
+    """
+    Still segments of a recording, and the noise they were found by.
+    """
+    @property
+    def accelerometer(self) -> RestNoise:
+        ...
+    @property
+    def gaps(self) -> int:
+        ...
+    @property
+    def gyroscope(self) -> RestNoise:
+        ...
+    @property
+    def not_finite(self) -> int:
+        """
+        rows left out
+        """
+    @property
+    def out_of_order(self) -> int:
+        """
+        rows left out: not later than the one before
+        """
+    @property
+    def quality(self) -> Quality:
+        ...
+    @property
+    def rate_hz(self) -> float:
+        """
+        one over the median period
+        """
+    @property
+    def samples(self) -> int:
+        """
+        taken
+        """
+    @property
+    def segments(self) -> list[StillSegment]:
+        """
+        in order of time
+        """
+    @property
+    def still_share(self) -> float:
+        """
+        of the samples taken
+        """
+    @property
+    def turning_segments(self) -> int:
+        """
+        left out: turning evenly
+        """
+    @property
+    def wandering_segments(self) -> int:
+        """
+        cut or left out: vibrating, but moving
+        """
+    @property
+    def window_samples(self) -> int:
+        ...
+class StillnessDetector:
+    """
+    The same rule sample by sample, half a window late.
+    """
+    def __init__(self, gyroscope: RestNoise, accelerometer: RestNoise, rate_hz: typing.SupportsFloat | typing.SupportsIndex, window_samples: typing.SupportsInt | typing.SupportsIndex, options: StillnessOptions = ..., gyroscope_bias: numpy.typing.ArrayLike | None = None) -> None:
+        ...
+    def update(self, time_ns: typing.SupportsInt | typing.SupportsIndex, gyroscope: numpy.typing.ArrayLike, accelerometer: numpy.typing.ArrayLike) -> bool:
+        """
+        True while the device is still.
+        """
+    @property
+    def rejected(self) -> int:
+        ...
+    @property
+    def still(self) -> bool:
+        ...
+    @property
+    def still_since_ns(self) -> int | None:
+        """
+        None in motion
+        """
+class AccelerometerOptions:
+    """
+    Gravity, and where the verdicts change.
+    """
+    def __init__(self, *, gravity: typing.SupportsFloat | typing.SupportsIndex = 9.80665, distinct_angle: typing.SupportsFloat | typing.SupportsIndex = 0.17453292519943295, least_poses: typing.SupportsInt | typing.SupportsIndex = 9, good_poses: typing.SupportsInt | typing.SupportsIndex = 15, outlier_sigmas: typing.SupportsFloat | typing.SupportsIndex = 4.685, ok_error: typing.SupportsFloat | typing.SupportsIndex = 0.001, fair_error: typing.SupportsFloat | typing.SupportsIndex = 0.003, warn_error: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    @property
+    def distinct_angle(self) -> float:
+        """
+        [rad]; closer poses count once
+        """
+    @property
+    def fair_error(self) -> float:
+        """
+        … fair
+        """
+    @property
+    def good_poses(self) -> int:
+        """
+        distinct ones; below: advice
+        """
+    @property
+    def gravity(self) -> float:
+        """
+        [m/s^2]
+        """
+    @property
+    def least_poses(self) -> int:
+        """
+        distinct ones; below: refused
+        """
+    @property
+    def ok_error(self) -> float:
+        """
+        predicted error over gravity that is ok
+        """
+    @property
+    def outlier_sigmas(self) -> float:
+        """
+        a pose further off is left out
+        """
+    @property
+    def warn_error(self) -> float:
+        """
+        … a warning; beyond: refused
+        """
+class AccelerometerFit:
+    """
+    corrected = triad.matrix @ (raw - triad.bias), of the length of gravity at rest. The matrix is symmetric: a rotation is not observable.
+    """
+    @property
+    def converged(self) -> bool:
+        ...
+    @property
+    def cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (9, 9) of bias x, y, z and matrix xx, yy, zz, xy, xz, yz
+        """
+    @property
+    def distinct(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        (P,) bool: first of its direction
+        """
+    @property
+    def distinct_poses(self) -> int:
+        ...
+    @property
+    def inlier(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        (P,) bool: poses used
+        """
+    @property
+    def inliers(self) -> int:
+        ...
+    @property
+    def leave_one_out_rms(self) -> float:
+        """
+        each predicted by the others [m/s^2]
+        """
+    @property
+    def left_out(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (P,) the same from a fit without the pose
+        """
+    @property
+    def pose_sigma(self) -> float:
+        """
+        from pose to pose, beyond the samples' noise [m/s^2]
+        """
+    @property
+    def predicted_error(self) -> float:
+        """
+        of a corrected reading, over gravity
+        """
+    @property
+    def quality(self) -> Quality:
+        ...
+    @property
+    def residual_rms(self) -> float:
+        """
+        [m/s^2]
+        """
+    @property
+    def residuals(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (P,) length less gravity [m/s^2]
+        """
+    @property
+    def solved(self) -> bool:
+        ...
+    @property
+    def triad(self) -> TriadCalibration:
+        """
+        raw to [m/s^2]
+        """
+class GyroscopeOptions:
+    """
+    Where the verdicts change.
+    """
+    def __init__(self, *, gap_periods: typing.SupportsFloat | typing.SupportsIndex = 5.0, outlier_chi2: typing.SupportsFloat | typing.SupportsIndex = 18.4, ok_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.002, fair_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.005, warn_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.02) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    @property
+    def fair_sigma(self) -> float:
+        """
+        … fair
+        """
+    @property
+    def gap_periods(self) -> float:
+        """
+        a longer pause makes a turn unusable
+        """
+    @property
+    def ok_sigma(self) -> float:
+        """
+        predicted relative deviation of the matrix that is ok
+        """
+    @property
+    def outlier_chi2(self) -> float:
+        """
+        of a turn; beyond, it is left out
+        """
+    @property
+    def warn_sigma(self) -> float:
+        """
+        … a warning; beyond: bias only
+        """
+class GyroscopeFit:
+    """
+    angular velocity = triad.matrix @ (raw - triad.bias), in the accelerometer's axes.
+    """
+    @property
+    def bias_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 3), raw units
+        """
+    @property
+    def bias_known(self) -> bool:
+        ...
+    @property
+    def bias_range(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) largest less smallest, raw units
+        """
+    @property
+    def bias_slope(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) raw units per second
+        """
+    @property
+    def bias_spread(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) deviation over the segments, raw units
+        """
+    @property
+    def chi2_ratio(self) -> float:
+        """
+        over the degrees of freedom
+        """
+    @property
+    def converged(self) -> bool:
+        ...
+    @property
+    def cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (9, 9) of the matrix row by row
+        """
+    @property
+    def inliers(self) -> int:
+        """
+        turns used
+        """
+    @property
+    def left_handed(self) -> bool:
+        ...
+    @property
+    def matrix_known(self) -> bool:
+        """
+        False: bias only, the matrix is the identity
+        """
+    @property
+    def quality(self) -> Quality:
+        ...
+    @property
+    def relative_sigma(self) -> float:
+        """
+        largest deviation of the matrix in any direction, over its mean scale
+        """
+    @property
+    def residual_rms(self) -> float:
+        """
+        [rad]
+        """
+    @property
+    def rotation_angle(self) -> float:
+        """
+        [rad] to the accelerometer's axes
+        """
+    @property
+    def segments(self) -> int:
+        """
+        still ones, that the bias is from
+        """
+    @property
+    def triad(self) -> TriadCalibration:
+        """
+        raw to [rad/s]
+        """
+    @property
+    def turn_gravity_angle(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (T,) [rad] by which gravity turned
+        """
+    @property
+    def turn_inlier(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        (T,) bool
+        """
+    @property
+    def turn_residuals(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (T,) [rad]; NaN where the turn was not usable
+        """
+class AllanOptions:
+    """
+    At which averaging times the Allan deviation is taken.
+    """
+    def __init__(self, *, points_per_octave: typing.SupportsInt | typing.SupportsIndex = 4, longest_share: typing.SupportsFloat | typing.SupportsIndex = 0.125) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    @property
+    def longest_share(self) -> float:
+        """
+        longest averaging time over the recording
+        """
+    @property
+    def points_per_octave(self) -> int:
+        ...
+class AllanTerm:
+    """
+    One term of the noise; value and sigma are NaN unless it was identified.
+    """
+    @property
+    def identified(self) -> bool:
+        ...
+    @property
+    def share(self) -> float:
+        """
+        of the fitted variance, there
+        """
+    @property
+    def sigma(self) -> float:
+        ...
+    @property
+    def tau_s(self) -> float:
+        """
+        where its share is largest
+        """
+    @property
+    def upper_bound(self) -> float:
+        ...
+    @property
+    def value(self) -> float:
+        ...
+class AllanFit:
+    """
+    Overlapping Allan deviation of one axis and its terms.
+    """
+    @property
+    def bias_instability(self) -> AllanTerm:
+        """
+        B [unit]
+        """
+    @property
+    def deviation(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K,)
+        """
+    @property
+    def duration_s(self) -> float:
+        ...
+    @property
+    def fitted_from_tau_s(self) -> float:
+        """
+        shorter ones: the sensor's own filter
+        """
+    @property
+    def freedom(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K,) equivalent degrees of freedom
+        """
+    @property
+    def minimum_deviation(self) -> float:
+        ...
+    @property
+    def minimum_tau_s(self) -> float:
+        ...
+    @property
+    def misfit(self) -> float:
+        """
+        rms of the residuals in their own deviations
+        """
+    @property
+    def noise_density(self) -> AllanTerm:
+        """
+        N [unit/sqrt(Hz)]
+        """
+    @property
+    def quality(self) -> Quality:
+        ...
+    @property
+    def random_walk(self) -> AllanTerm:
+        """
+        K [unit/s/sqrt(Hz)]
+        """
+    @property
+    def rate_hz(self) -> float:
+        ...
+    @property
+    def sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K,) deviation of the deviation
+        """
+    @property
+    def tau_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K,) averaging times
+        """
+class ImuAllan:
+    """
+    Allan deviation of all axes, from the longest part without motion and gaps.
+    """
+    @property
+    def accelerometer(self) -> list[AllanFit]:
+        """
+        three fits, or none
+        """
+    @property
+    def begin(self) -> int:
+        """
+        rows used
+        """
+    @property
+    def duration_s(self) -> float:
+        ...
+    @property
+    def end(self) -> int:
+        ...
+    @property
+    def gyroscope(self) -> list[AllanFit]:
+        """
+        three fits, or none
+        """
+    @property
+    def quality(self) -> Quality:
+        ...
+    @property
+    def used_share(self) -> float:
+        ...
+class ImuNoiseFit:
+    """
+    Noise for the estimators, and where each field is from.
+    """
+    @property
+    def measured(self) -> list[str]:
+        """
+        names of the fields that the recording determines
+        """
+    @property
+    def noise(self) -> ImuNoise:
+        ...
+    @property
+    def quality(self) -> Quality:
+        ...
+class MagnetometerAlignmentOptions:
+    """
+    How the magnetometer is aligned, and where verdicts change.
+    """
+    def __init__(self, *, interval_s: typing.SupportsFloat | typing.SupportsIndex = 0.25, expected_dip: typing.SupportsFloat | typing.SupportsIndex = ..., norm_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.2, force_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.03, gap_periods: typing.SupportsFloat | typing.SupportsIndex = 5.0, least_second_axis: typing.SupportsFloat | typing.SupportsIndex = 0.1, ok_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.008726646259971648, fair_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.017453292519943295, warn_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.05235987755982988) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    @property
+    def expected_dip(self) -> float:
+        """
+        [rad] positive down; NaN: mirroring is not checked
+        """
+    @property
+    def fair_sigma(self) -> float:
+        """
+        … fair
+        """
+    @property
+    def force_tolerance(self) -> float:
+        """
+        of the specific force taken as gravity, relative
+        """
+    @property
+    def gap_periods(self) -> float:
+        """
+        a longer pause ends an interval
+        """
+    @property
+    def interval_s(self) -> float:
+        """
+        over which the gyroscope carries the field
+        """
+    @property
+    def least_second_axis(self) -> float:
+        """
+        turning about a second axis over the first
+        """
+    @property
+    def norm_tolerance(self) -> float:
+        """
+        of the field's length, relative
+        """
+    @property
+    def ok_sigma(self) -> float:
+        """
+        [rad] predicted deviation that is ok
+        """
+    @property
+    def warn_sigma(self) -> float:
+        """
+        … a warning; beyond: refused
+        """
+class MagnetometerAlignment:
+    """
+    field in body axes = matrix @ magnetometer
+    """
+    @property
+    def angle(self) -> float:
+        """
+        [rad] of the rotation
+        """
+    @property
+    def axes(self) -> str:
+        """
+        magnetometer axis nearest to each body axis
+        """
+    @property
+    def cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 3) [rad^2] of a rotation on the right
+        """
+    @property
+    def delay_s(self) -> float:
+        """
+        readings are of so much before their time stamp
+        """
+    @property
+    def delay_sigma_s(self) -> float:
+        ...
+    @property
+    def dip(self) -> float:
+        """
+        [rad] positive down; NaN without gravity
+        """
+    @property
+    def dip_scatter(self) -> float:
+        """
+        [rad] of single readings
+        """
+    @property
+    def dip_sigma(self) -> float:
+        """
+        [rad]
+        """
+    @property
+    def disturbed(self) -> int:
+        ...
+    @property
+    def gravity_readings(self) -> int:
+        ...
+    @property
+    def gyroscope_bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [rad/s] still in the readings
+        """
+    @property
+    def inliers(self) -> int:
+        ...
+    @property
+    def intervals(self) -> int:
+        ...
+    @property
+    def matrix(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 3), orthonormal; determinant -1 when mirrored
+        """
+    @property
+    def mirror_checked(self) -> bool:
+        ...
+    @property
+    def mirrored(self) -> bool:
+        ...
+    @property
+    def not_finite(self) -> int:
+        ...
+    @property
+    def permuted(self) -> bool:
+        ...
+    @property
+    def quality(self) -> Quality:
+        ...
+    @property
+    def repeated(self) -> int:
+        ...
+    @property
+    def residual_rms(self) -> float:
+        """
+        [rad]
+        """
+    @property
+    def second_axis_share(self) -> float:
+        ...
+    @property
+    def sigma(self) -> float:
+        """
+        [rad] largest deviation of the rotation
+        """
+    @property
+    def solved(self) -> bool:
+        ...
+    @property
+    def too_fast(self) -> int:
+        ...
 class Trajectory:
     """
     Poses T_world_body over time.
@@ -1527,6 +2950,11 @@ class MeasurementSource:
         """
         The rest of the recording as arrays.
         """
+    @property
+    def origin(self) -> tuple[float, float, float] | None:
+        """
+        Latitude, longitude [rad] and altitude [m] of the world's origin of a reference that is given in degrees (ASPN-23); None before its first position, and for other recordings.
+        """
 class LcmLogReader:
     """
     Iterates over the events of an LCM log: (event number, log time [us since 1970], channel, data). Damage is skipped to the next event and reported by damage().
@@ -1543,13 +2971,68 @@ class LcmLogReader:
         """
         What was not readable so far; empty when all was.
         """
+class NmeaFixes:
+    """
+    One row for each epoch. What the receiver did not say is NaN.
+    """
+    @property
+    def counts(self) -> dict[str, int]:
+        """
+        Sentences by type, refused ones by reason, epochs without fix.
+        """
+    @property
+    def fix(self) -> numpy.typing.NDArray[numpy.int8]:
+        """
+        (N,) int8, GpsFixType; 0 rows have no position
+        """
+    @property
+    def gps_times_ns(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (N,) int64, since 1980-01-06 without leap seconds; NO_TIME when unknown
+        """
+    @property
+    def latitude_longitude_altitude(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [rad, rad, m above the ellipsoid]
+        """
+    @property
+    def position_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3, 3) [m^2], east, north, up
+        """
+    @property
+    def satellites(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        (N,) int32, -1 when unknown
+        """
+    @property
+    def velocity_enu(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [m/s], up is NaN
+        """
 def absolute_error(estimate: Trajectory, reference: Trajectory, alignment: str = 'se3') -> AbsoluteError:
     """
     Of paired trajectories (see associate). alignment: "se3", "sim3", "yaw" or "none". DataError when the poses do not determine it.
     """
+def align_magnetometer(times_ns: numpy.typing.NDArray[numpy.int64], gyroscope: numpy.typing.NDArray[numpy.float64], accelerometer: numpy.typing.NDArray[numpy.float64] | None, magnetometer: numpy.typing.NDArray[numpy.float64], options: MagnetometerAlignmentOptions = ...) -> MagnetometerAlignment:
+    """
+    Rotation from a calibrated magnetometer (any unit) to the IMU: int64 (N,), float64 (N, 3) [rad/s], [m/s^2] or None. A slower magnetometer repeats its reading or is NaN in between. Bad data do not raise: see quality.
+    """
 def align_points(estimate: numpy.typing.NDArray[numpy.float64], reference: numpy.typing.NDArray[numpy.float64], alignment: str = 'se3') -> Alignment:
     """
     Least-squares transform between points (N, 3) [m] that belong together (Umeyama): "se3", "sim3" (with scale), "yaw" (turn about z and translation) or "none".
+    """
+def aligned(magnetometer: TriadCalibration, alignment: MagnetometerAlignment) -> TriadCalibration:
+    """
+    The magnetometer's TriadCalibration followed by the alignment, for the rig.
+    """
+def allan_fit(values: numpy.typing.NDArray[numpy.float64], rate_hz: typing.SupportsFloat | typing.SupportsIndex, options: AllanOptions = ...) -> AllanFit:
+    """
+    float64 (N,) at a constant rate, the sensor at rest. DataError names a value that is not finite.
+    """
+def analyse_imu_noise(times_ns: numpy.typing.NDArray[numpy.int64], gyroscope: numpy.typing.NDArray[numpy.float64] | None, accelerometer: numpy.typing.NDArray[numpy.float64] | None, options: AllanOptions = ..., stillness: StillnessOptions = ...) -> ImuAllan:
+    """
+    int64 (N,); float64 (N, 3) [rad/s] and [m/s^2], one may be None. Bad data do not raise: see quality.
     """
 def associate(estimate: Trajectory, reference: Trajectory, *, max_difference_ns: typing.SupportsInt | typing.SupportsIndex = 10000000, estimate_time_offset_ns: typing.SupportsInt | typing.SupportsIndex = 0, interpolate_reference: bool = False, one_to_one: bool = True) -> Association:
     """
@@ -1562,6 +3045,10 @@ def average_consistency(values: numpy.typing.NDArray[numpy.float64], dof: typing
 def beta_from_gyro(noise: ImuNoise, bias_residual: typing.SupportsFloat | typing.SupportsIndex, scale_error: typing.SupportsFloat | typing.SupportsIndex, max_rate: typing.SupportsFloat | typing.SupportsIndex, dt_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     beta [rad/s] that covers the rates by which the gyroscope can be wrong: bias_residual [rad/s], scale_error (relative) at max_rate [rad/s], and noise at samples dt_s [s] apart.
+    """
+def calibrate_clock(times_ns: numpy.typing.NDArray[numpy.int64], host_times_ns: numpy.typing.NDArray[numpy.int64], **kwargs) -> ClockCalibrationResult:
+    """
+    Stamps and arrivals of one stream, int64 (N,) in the order of arrival; options as of ClockModel.
     """
 def chi_square_cdf(x: typing.SupportsFloat | typing.SupportsIndex, dof: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
@@ -1579,9 +3066,53 @@ def error_statistics(errors: numpy.typing.NDArray[numpy.float64]) -> ErrorStatis
     """
     Of float64 errors (N,). ValueError when empty or not finite.
     """
+def estimate_time_offset(times_ns: numpy.typing.NDArray[numpy.int64], positions: numpy.typing.NDArray[numpy.float64], reference_times_ns: numpy.typing.NDArray[numpy.int64], reference_positions: numpy.typing.NDArray[numpy.float64], *, reference_velocities: typing.Any = None, reference_q_world_body_wxyz: typing.Any = None, max_offset_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, horizontal: bool = True, max_reference_gap_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, estimate_bias: bool = False, estimate_lever_arm: bool = False, lever_arm: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), correlation_s: typing.SupportsFloat | typing.SupportsIndex = 120.0) -> TimeOffsetResult:
+    """
+    By how much the stamps of a position stream are off against a reference trajectory in the same world (z up): t_reference = t_stream + offset_s. int64 (N,), float64 (N, 3) [m]; NaN rows are skipped. DataError names the index where times do not increase.
+    """
+def find_stillness(times_ns: numpy.typing.NDArray[numpy.int64], gyroscope: numpy.typing.NDArray[numpy.float64] | None, accelerometer: numpy.typing.NDArray[numpy.float64] | None, options: StillnessOptions = ...) -> Stillness:
+    """
+    Still segments of a recording of any unit: int64 (N,) times, float64 (N, 3) readings; one sensor may be None. Bad data do not raise: see Stillness.quality.
+    """
+def fit_accelerometer(segments: collections.abc.Sequence[StillSegment], options: AccelerometerOptions = ...) -> AccelerometerFit:
+    """
+    Nine parameters from the accelerometer's means in still segments. Bad data do not raise: see quality.
+    """
+def fit_accelerometer_poses(means: numpy.typing.NDArray[numpy.float64], sigmas: numpy.typing.NDArray[numpy.float64] | None = None, options: AccelerometerOptions = ...) -> AccelerometerFit:
+    """
+    The same from float64 (P, 3) means of still poses; sigmas (P,): deviation of each mean, raw units.
+    """
+def fit_ellipsoid(readings: numpy.typing.NDArray[numpy.float64], options: EllipsoidOptions = ..., weights: numpy.typing.NDArray[numpy.float64] | None = None) -> EllipsoidFit:
+    """
+    Fits an ellipsoid to float64 (N, 3) readings of any unit; weights (N,): information of a reading relative to the others. Bad data do not raise: see EllipsoidFit.quality.
+    """
+def fit_gyroscope(times_ns: numpy.typing.NDArray[numpy.int64], gyroscope: numpy.typing.NDArray[numpy.float64], segments: collections.abc.Sequence[StillSegment], accelerometer: AccelerometerFit, options: GyroscopeOptions = ...) -> GyroscopeFit:
+    """
+    Bias, scale and misalignment from the turns between the still segments of the same recording.
+    """
+def fit_gyroscope_bias(segments: collections.abc.Sequence[StillSegment]) -> GyroscopeFit:
+    """
+    Bias alone.
+    """
 def format_seconds(time_ns: typing.SupportsInt | typing.SupportsIndex) -> str:
     """
     Nanoseconds as seconds with nine decimals.
+    """
+def gps_from_unix(unix_time_ns: typing.SupportsInt | typing.SupportsIndex, *, leap_seconds: typing.SupportsInt | typing.SupportsIndex | None = None) -> int | None:
+    """
+    Nanoseconds since 1970 (UTC) to GPS time: since 1980-01-06, leap seconds counted. None before 1980 and after 2260. leap_seconds: GPS minus UTC, where the library's table is not to be used.
+    """
+def imu_noise_from(allan: ImuAllan, fallback: ImuNoise = ...) -> ImuNoiseFit:
+    """
+    What was not identified keeps the fallback's value, or the upper bound where that is lower.
+    """
+def leap_seconds_known_until() -> str:
+    """
+    First day, as YYYY-MM-DD, of which the library's table of leap seconds does not know.
+    """
+def local_positions(latitude_longitude_altitude: numpy.typing.NDArray[numpy.float64], origin: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    East, north, up (N, 3) [m] of positions on the WGS 84 ellipsoid, [rad, rad, m], in the plane that touches it at the origin. NaN stays NaN.
     """
 def message_fingerprints() -> dict[str, int]:
     """
@@ -1611,9 +3142,17 @@ def open_lcm_log(path: os.PathLike | str | bytes) -> MeasurementSource:
     """
     The measurements in an LCM log, in the order of the log: package loc's types and ASPN-23's. What cannot be decoded is counted.
     """
+def open_nmea(path: os.PathLike | str | bytes, *, reference_date: typing.Any | None = None, leap_seconds: typing.SupportsInt | typing.SupportsIndex | None = None, geoid_separation: typing.SupportsFloat | typing.SupportsIndex | None = None, sigma_per_dop: typing.SupportsFloat | typing.SupportsIndex = 0.0, accept_not_measured: bool = False) -> MeasurementSource:
+    """
+    The fixes of an NMEA log as a recording, on GPS time. Options as parse_nmea.
+    """
 def orientation_error(estimate_wxyz: numpy.typing.NDArray[numpy.float64], reference_wxyz: numpy.typing.NDArray[numpy.float64], mask: numpy.typing.NDArray[numpy.bool] | None = None, *, align_heading: bool = False) -> OrientationError:
     """
     float64 (N, 4) of the same times, NaN where unknown; mask: bool (N,), where to score. align_heading removes the turn about z that they have in common: for a heading that is relative to the start. DataError when nothing is left to score.
+    """
+def parse_nmea(data: bytes, *, reference_date: typing.Any | None = None, leap_seconds: typing.SupportsInt | typing.SupportsIndex | None = None, geoid_separation: typing.SupportsFloat | typing.SupportsIndex | None = None, sigma_per_dop: typing.SupportsFloat | typing.SupportsIndex = 0.0, accept_not_measured: bool = False) -> NmeaFixes:
+    """
+    Fixes in the bytes of a receiver; anything may stand between the sentences. reference_date: a datetime.date within 10 years of the data, which resolves two-digit years and mends the dates of receivers that are past their 1024 weeks. leap_seconds: GPS minus UTC instead of the library's table. geoid_separation [m]: where the receiver does not say it. sigma_per_dop [m]: covariance for fixes without GST; 0: NaN. accept_not_measured: dead-reckoned, manual and simulator positions count as fixes.
     """
 def parse_seconds(text: str) -> int:
     """
@@ -1643,6 +3182,22 @@ def root_mean_square(values: numpy.typing.NDArray[numpy.float64]) -> float:
     """
     Root mean square of float64 values (N,). ValueError when empty.
     """
+def simulate_clock(scenario: str, duration_s: typing.SupportsFloat | typing.SupportsIndex, random: Random) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
+    """
+    'usb_imu' (200 Hz), 'pps' or 'nmea_only': (device_times_ns, host_times_ns, truth_ns), int64 (N,) each; the truth is true host time + minimum delay.
+    """
+def simulate_gps_time(duration_s: typing.SupportsFloat | typing.SupportsIndex, random: Random, with_pulses: bool = True, label_next: bool = False) -> tuple[numpy.typing.NDArray[numpy.bool], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
+    """
+    (is_pulse, host_times_ns, gps_times_ns) as GpsClock.update takes them, then the truth second by second: host times and GPS times, int64 (M,).
+    """
+def unix_from_gps(gps_time_ns: typing.SupportsInt | typing.SupportsIndex, *, leap_seconds: typing.SupportsInt | typing.SupportsIndex | None = None) -> int:
+    """
+    GPS time to nanoseconds since 1970 (UTC); a leap second has the number of the second after it.
+    """
+def update_rig(path: os.PathLike | str | bytes, change: collections.abc.Callable[[typing.Any], None]) -> Rig:
+    """
+    Reads rig.yaml (an empty rig when there is none), calls change(rig), which alters it, and writes it. What is not changed stays as it was to the last bit, but comments are lost. When anything raises, the file stays as it was.
+    """
 def write_rig(path: os.PathLike | str | bytes, rig: Rig) -> None:
     """
     Writes rig.yaml; read_rig gives the same numbers back.
@@ -1656,6 +3211,7 @@ GPS_CHANNEL: str = 'LOC_GPS'
 IMAGE_CHANNEL: str = 'LOC_IMAGE'
 IMU_CHANNEL: str = 'LOC_IMU'
 MAGNETOMETER_CHANNEL: str = 'LOC_MAGNETOMETER'
+NO_TIME: int = -9223372036854775808
 REFERENCE_CHANNEL: str = 'LOC_REFERENCE'
 SOURCE_STATUS_CHANNEL: str = 'LOC_SOURCE_STATUS'
 STATISTICS_CHANNEL: str = 'LOC_STATISTICS'
