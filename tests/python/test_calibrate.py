@@ -42,6 +42,7 @@ def test_block_and_report(tmp_path, capsys):
         capsys,
         "magnetometer",
         tmp_path / "bent.csv",
+        "--no-alignment",
         "--field-ut",
         48.332,
         "--out",
