@@ -211,13 +211,13 @@ void judge(AllanFit& fit) {
   }
   if (!fit.bias_instability.identified) {
     fit.quality.lower_to(Verdict::kFair, "The bias instability is not visible in " + duration + ", it is at most " +
-                                             to_text(fit.bias_instability.upper_bound) +
+                                             to_text(fit.bias_instability.upper_bound, 3) +
                                              ": the curve has no floor of its own. Record longer.");
   }
   if (!fit.random_walk.identified) {
     fit.quality.lower_to(Verdict::kFair,
                          "The random walk of the bias is not visible in " + duration + ", it is at most " +
-                             to_text(fit.random_walk.upper_bound) +
+                             to_text(fit.random_walk.upper_bound, 3) +
                              ": the curve does not rise at its end. Record longer, hours rather than minutes.");
   }
   if (fit.misfit > 3) {
@@ -347,7 +347,7 @@ ImuNoiseFit imu_noise_from(const ImuAllan& allan, const ImuNoise& fallback) {
   const auto take = [&](const std::array<AllanFit, 3>& axes, bool present, AllanTerm AllanFit::*term,
                         const std::string& name, Verdict missing, double& field) {
     if (!present) {
-      out.quality.lower_to(missing, name + " was not recorded: " + to_text(field) + " is the fallback.");
+      out.quality.lower_to(missing, name + " was not recorded: " + to_text(field, 3) + " is the fallback.");
       return;
     }
     double square = 0;
@@ -369,10 +369,10 @@ ImuNoiseFit imu_noise_from(const ImuAllan& allan, const ImuNoise& fallback) {
       }
     } else if (bound > 0 && bound < field) {
       field = bound;
-      out.quality.lower_to(missing, name + " was not identified: " + to_text(field) +
+      out.quality.lower_to(missing, name + " was not identified: " + to_text(field, 3) +
                                         " is the largest value that the recording allows.");
     } else {
-      out.quality.lower_to(missing, name + " was not identified: " + to_text(field) + " is the fallback.");
+      out.quality.lower_to(missing, name + " was not identified: " + to_text(field, 3) + " is the fallback.");
     }
   };
   take(allan.gyroscope, allan.has_gyroscope, &AllanFit::noise_density, "gyroscope_noise_density", Verdict::kWarn,

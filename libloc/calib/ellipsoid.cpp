@@ -237,7 +237,21 @@ Matrix9 covariance(const NormalisedReadings& readings, const Ellipsoid& e, const
   if (!(values[0] > 1e-14 * values[values.size() - 1])) return Matrix9::Constant(kUnknown);
   const Eigen::MatrixXd inverse =
       eigen.eigenvectors() * values.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
-  return basis * (inverse * spread * inverse) * basis.transpose();
+  const Matrix9 cov = basis * (inverse * spread * inverse) * basis.transpose();
+  if (!sphere || options.shape_prior_sigma <= 0) return cov;
+  // The true shape is not quite a sphere. What that does to the centre depends on which part of it was seen: nothing
+  // all around, much on a small cap.
+  Eigen::Matrix<double, 6, 1> residual;
+  Eigen::Matrix<double, 6, 6> shape;
+  detail::shape_prior(e, options.shape_prior_sigma, residual, shape);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> axes(shape.transpose() * shape);
+  // The size has no prior, and is fitted.
+  Eigen::Matrix<double, 6, 1> variances = axes.eigenvalues().cwiseInverse();
+  variances[0] = 0;
+  const Eigen::Matrix<double, 6, 6> shape_cov =
+      axes.eigenvectors() * variances.asDiagonal() * axes.eigenvectors().transpose();
+  const Eigen::MatrixXd effect = basis * inverse * basis.transpose() * (slope * hessian).rightCols<6>();
+  return cov + effect * shape_cov * effect.transpose();
 }
 
 Eigen::Matrix3d symmetric(const Eigen::Matrix<double, 6, 1>& w) {

@@ -16,7 +16,7 @@
 //           Marquardt; starts from Li, Griffiths, "Least squares ellipsoid specific fitting", GMP 2004, or, where
 //           outliers are likely, from the least median of squares of such fits. A weak prior that the shape is near a
 //           sphere holds what the data do not determine.
-//   sphere  centre and radius only, same loss.
+//   sphere  centre and radius only, same loss; its covariance holds what a shape near a sphere does to the centre.
 #pragma once
 
 #include <Eigen/Core>
@@ -40,9 +40,10 @@ EllipsoidMethod parse_ellipsoid_method(const std::string& name);
 struct EllipsoidOptions {
   EllipsoidMethod method = EllipsoidMethod::kRobust;
   double reference_norm = 0;  ///< |corrected|, in the unit wanted: 9.80665, 48e-6; 0: the readings' own mean radius
-  double shape_prior_sigma = 0.2;  ///< robust: deviation of the relative axis lengths from a sphere; 0: no prior
-  double tukey_c = 4.685;          ///< robust, sphere: residuals beyond this many sigma do not count
-  double outlier_share = 0.02;     ///< robust: above this share the start is the least median of squares
+  double shape_prior_sigma =
+      0.2;                 ///< of the relative axis lengths from a sphere; 0: robust has no prior, sphere is believed
+  double tukey_c = 4.685;  ///< robust, sphere: residuals beyond this many sigma do not count
+  double outlier_share = 0.02;  ///< robust: above this share the start is the least median of squares
   int max_iterations = 100;
   std::uint64_t seed = 1;          ///< of the subsets of the least median of squares
   double ok_centre_sigma = 0.003;  ///< predicted deviation of the centre over the radius: up to here ok, …

@@ -236,6 +236,40 @@ LeastSquaresResult refine(const std::vector<FieldInterval>& intervals, const Eig
   return minimise(function, x0, {.max_iterations = 30});
 }
 
+/// Covariance that also holds where residuals are not independent: neighbours share a reading, and what the model
+/// leaves out (filters of the sensors, disturbed field) lasts longer than one interval. The scores of whole blocks tell
+/// (Liang, Zeger, "Longitudinal data analysis using generalized linear models", 1986); where they say less than the
+/// curvature, the curvature holds.
+Eigen::MatrixXd cautious_covariance(const std::vector<FieldInterval>& intervals, const Eigen::Quaterniond& r,
+                                    const AlignmentVector& x, const Weights& w, const Eigen::MatrixXd& cov) {
+  constexpr std::size_t kBlock = 20;
+  constexpr std::size_t kLeastBlocks = 8;
+  const std::size_t block = std::max<std::size_t>(1, std::min(kBlock, intervals.size() / kLeastBlocks));
+  Eigen::Matrix<double, 8, 8> scores = Eigen::Matrix<double, 8, 8>::Zero();
+  AlignmentVector score = AlignmentVector::Zero();
+  std::size_t blocks = 0;
+  for (std::size_t k = 0; k < intervals.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    const Eigen::Vector4d weight(w.turn[i], w.turn[i], w.turn[i], w.gravity[i]);
+    Eigen::Matrix<double, 4, 8> jacobian;
+    const Eigen::Vector4d residual = weight.cwiseProduct(alignment_residual(intervals[k], r, x, &jacobian));
+    score += (weight.asDiagonal() * jacobian).transpose() * residual;
+    if ((k + 1) % block == 0 || k + 1 == intervals.size()) {
+      scores += score * score.transpose();
+      score.setZero();
+      ++blocks;
+    }
+  }
+  scores *= static_cast<double>(blocks) / std::max(1.0, static_cast<double>(blocks) - 1);
+  const Eigen::LLT<Eigen::MatrixXd> llt(cov);
+  if (llt.info() != Eigen::Success) return cov;
+  // In units of the curvature's own deviations the model says 1 in every direction.
+  const Eigen::MatrixXd root = llt.matrixL();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(root.transpose() * scores * root);
+  const Eigen::MatrixXd directions = root * eigen.eigenvectors();
+  return directions * eigen.eigenvalues().cwiseMax(1.0).asDiagonal() * directions.transpose();
+}
+
 /// The signed axes that the matrix is nearest to, and by how much it is off.
 void name_axes(MagnetometerAlignment& out) {
   Eigen::Matrix3d nearest = Eigen::Matrix3d::Zero();
@@ -416,9 +450,11 @@ MagnetometerAlignment align_magnetometer(std::span<const TimeNs> times_ns, const
     x.head<3>().setZero();
     if (step < 1e-9) break;
   }
-  const auto cov = covariance_from(result.information);
-  if (!cov || !x.allFinite())
+  auto cov = covariance_from(result.information);
+  if (!cov || !x.allFinite()) {
     return refuse("The turning does not determine the rotation: turn the device about all axes.");
+  }
+  cov = cautious_covariance(intervals, r, x, w, *cov);
 
   out.solved = true;
   out.matrix = r.toRotationMatrix();

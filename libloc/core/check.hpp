@@ -24,6 +24,14 @@ inline std::string to_text(double value) {
   return {buffer.data(), result.ptr};
 }
 
+/// Text for a person, with so many significant digits (at most 17).
+inline std::string to_text(double value, int digits) {
+  std::array<char, 32> buffer{};
+  const auto result =
+      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::general, digits);
+  return {buffer.data(), result.ptr};
+}
+
 /// @throws std::invalid_argument saying what, unless ok.
 inline void require(bool ok, std::string_view what) {
   if (!ok) throw std::invalid_argument(std::string(what));

@@ -279,10 +279,28 @@ TEST(Ellipsoid, SphereFindsTheCentre) {
     s.readings.row(i) = (s.centre + s.radius * (random.direction() + 0.005 * random.normal3())).transpose();
     if (i % 20 == 0) s.readings.row(i) += 0.8 * s.radius * Eigen::RowVector3d(1, 0, 0);
   }
-  const EllipsoidFit fit = fit_with(s.readings, EllipsoidMethod::kSphere);
+  const EllipsoidFit fit = fit_ellipsoid(s.readings, {.method = EllipsoidMethod::kSphere, .shape_prior_sigma = 0});
   EXPECT_LT((fit.centre - s.centre).norm(), 4 * fit.centre_sigma * fit.radius);
   EXPECT_LT(fit.centre_sigma, 0.001);
   EXPECT_TRUE(test::near(fit.matrix, Eigen::Matrix3d::Identity().eval(), 1e-12));
+}
+
+TEST(Ellipsoid, SphereKnowsWhatAShapeNearASphereDoesToItsCentre) {
+  // True shapes drawn as the prior says; errors of the centre over their deviation, for caps from small to whole.
+  for (const double cap : {0.2, 0.5, 1.0}) {
+    Random random(16);
+    int inside = 0;
+    double largest = 0;
+    for (int run = 0; run < 100; ++run) {
+      const EllipsoidSample s = simulate_ellipsoid({.name = "", .cap = cap}, random);
+      const EllipsoidFit fit =
+          fit_ellipsoid(s.readings, {.method = EllipsoidMethod::kSphere, .shape_prior_sigma = 0.1});
+      const Eigen::Vector3d error = fit.centre - s.centre;
+      inside += error.dot(fit.cov.topLeftCorner<3, 3>().ldlt().solve(error)) < chi_square_quantile(0.99, 3) ? 1 : 0;
+      largest = std::max(largest, error.norm() / s.radius);
+    }
+    EXPECT_GE(inside, 90) << "cap " << cap << ", largest error " << largest;
+  }
 }
 
 TEST(Ellipsoid, OptionsAndSizesAreChecked) {

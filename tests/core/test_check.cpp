@@ -1,6 +1,7 @@
 // What the checks at the boundary say about a value.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <limits>
 
@@ -36,6 +37,13 @@ TEST(Check, the_shortest_text_reads_back_as_the_same_number) {
     EXPECT_EQ(std::strtod(to_text(value).c_str(), nullptr), value) << to_text(value);
   }
   EXPECT_EQ(to_text(1.0000000000000002), "1.0000000000000002");
+}
+
+TEST(Check, TextForAPersonHasSoManyDigits) {
+  EXPECT_EQ(to_text(0.0001370104354166664, 3), "0.000137");
+  EXPECT_EQ(to_text(-2.0, 3), "-2");
+  EXPECT_EQ(to_text(1.23456e-9, 3), "1.23e-09");
+  EXPECT_EQ(to_text(std::nan(""), 3), "nan");
 }
 
 }  // namespace
