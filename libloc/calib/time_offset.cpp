@@ -194,13 +194,16 @@ struct Solution {
 struct Row {
   TimeNs time_ns = 0;
   Jacobian J;
-  Residual r;  // weighted
+  Residual r;       // weighted
+  double norm = 0;  // of the residual, without weight
 };
 
 // Covariance of sum(J^T r), where residuals are correlated in time: sum over pairs of J_a^T J_b times the residuals'
 // autocovariance at that distance. That is taken over the whole recording, which makes it far less noisy than sums of
-// products of the terms themselves. Tapered, so that the sum cannot become negative.
-Eigen::MatrixXd correlated_information(const std::vector<Row>& rows, double correlation_s) {
+// products of the terms themselves. The autocovariance is taken in full up to the share `flat` of the longest distance
+// and fades from there (Politis, Romano, "Bias-corrected nonparametric spectral estimation", 1995); with 0 the sum
+// cannot become negative, and is too small by what fades.
+Eigen::MatrixXd correlated_information(const std::vector<Row>& rows, double correlation_s, double flat) {
   const Eigen::Index n = rows[0].J.cols();
   const double span = to_seconds(rows.back().time_ns - rows[0].time_ns);
   const double period = span / static_cast<double>(rows.size() - 1);
@@ -218,7 +221,8 @@ Eigen::MatrixXd correlated_information(const std::vector<Row>& rows, double corr
       ++pairs;
     }
     if (pairs == 0) continue;
-    const double taper = 1 - static_cast<double>(lag) / static_cast<double>(lags);
+    const double distance = static_cast<double>(lag) / static_cast<double>(lags);
+    const double taper = std::min(1.0, (1 - distance) / (1 - flat));
     covariance *= taper / static_cast<double>(pairs);
     out += lag == 0 ? Eigen::MatrixXd(covariance * products)
                     : Eigen::MatrixXd(covariance * (products + products.transpose()));
@@ -242,7 +246,8 @@ Solution solve(const Problem& problem, const PositionStream& stream, const TimeO
       Row& row = rows[k];
       row.time_ns = stream.times_ns[problem.used[k]];
       row.r = problem.residual(problem.used[k], s.x, &row.J);
-      const double weight = std::min(1.0, kHuber * s.scale / std::max(row.r.norm(), 1e-12));
+      row.norm = row.r.norm();
+      const double weight = std::min(1.0, kHuber * s.scale / std::max(row.norm, 1e-12));
       information += weight * row.J.transpose() * row.J;
       row.r *= weight;
       right += row.J.transpose() * row.r;
@@ -262,10 +267,22 @@ Solution solve(const Problem& problem, const PositionStream& stream, const TimeO
     s.converged = std::abs(step(0)) < 1e-6 && step.cwiseAbs().maxCoeff() < 1e-5;
   }
   linearise();
-  const Eigen::MatrixXd meat = correlated_information(rows, options.correlation_s);
   const Eigen::LDLT<Eigen::MatrixXd> solver(information);
-  const Eigen::MatrixXd half = solver.solve(meat);
-  s.cov = solver.solve(half.transpose());
+  for (const double flat : {0.0, 0.5}) {
+    const Eigen::MatrixXd half = solver.solve(correlated_information(rows, options.correlation_s, flat));
+    const Eigen::MatrixXd cov = solver.solve(half.transpose());
+    if (flat == 0 || cov(0, 0) > s.cov(0, 0)) s.cov = cov;
+  }
+  if (!options.estimate_bias) {
+    // A constant difference of the positions shifts the offset by as much as the mean velocity lets it.
+    Eigen::MatrixXd pulls = Eigen::MatrixXd::Zero(n, problem.axes());
+    for (const Row& row : rows) {
+      const double weight = std::min(1.0, kHuber * s.scale / std::max(row.norm, 1e-12));
+      pulls += weight * row.J.transpose();
+    }
+    const Eigen::MatrixXd shift = options.bias_sigma_m * solver.solve(pulls);
+    s.cov += shift * shift.transpose();
+  }
   return s;
 }
 
@@ -306,6 +323,7 @@ void TimeOffsetOptions::check() const {
   require_positive("max_reference_gap_s", max_reference_gap_s);
   require(max_reference_gap_s <= 1e6, "max_reference_gap_s", max_reference_gap_s, "must be at most 1e6");
   require_not_negative("correlation_s", correlation_s);
+  require_not_negative("bias_sigma_m", bias_sigma_m);
   require(lever_arm.allFinite(), "lever_arm must be finite");
 }
 

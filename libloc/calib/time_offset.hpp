@@ -32,6 +32,7 @@ struct TimeOffsetOptions {
   bool horizontal = true;            ///< x and y only: heights of GPS are poor, and of little motion.
   double max_reference_gap_s = 1.0;  ///< The reference is not interpolated over longer gaps.
   bool estimate_bias = false;        ///< Also a constant difference of the positions, in world.
+  double bias_sigma_m = 1.5;         ///< Where it is not estimated: what it may be (one axis), for sigma.
   bool estimate_lever_arm = false;   ///< Also a constant place of the antenna, in body. Needs rotations.
   Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();  ///< of the antenna in body, if known [m]; needs rotations
   double correlation_s = 120;  ///< Errors of the stream farther apart count as independent, for sigma.

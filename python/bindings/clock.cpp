@@ -459,7 +459,7 @@ void bind_time_offset(py::module_& m) {
       [](const TimeArray& times, const FloatArray& positions, const TimeArray& reference_times,
          const FloatArray& reference_positions, const py::object& reference_velocities,
          const py::object& reference_rotations, double max_offset_s, bool horizontal, double max_gap_s, bool bias,
-         bool lever_arm, const ArrayLike& known_lever_arm, double correlation_s) {
+         bool lever_arm, const ArrayLike& known_lever_arm, double correlation_s, double bias_sigma_m) {
         const auto stream = stream_of(times, positions, py::none(), py::none(), "");
         const auto reference =
             stream_of(reference_times, reference_positions, reference_velocities, reference_rotations, "reference_");
@@ -471,6 +471,7 @@ void bind_time_offset(py::module_& m) {
         options.estimate_lever_arm = lever_arm;
         options.lever_arm = vector3(known_lever_arm, "lever_arm");
         options.correlation_s = correlation_s;
+        options.bias_sigma_m = bias_sigma_m;
         const py::gil_scoped_release release;
         return loc::estimate_time_offset(stream, reference, options);
       },
@@ -479,7 +480,7 @@ void bind_time_offset(py::module_& m) {
       py::arg("max_offset_s") = d.max_offset_s, py::arg("horizontal") = d.horizontal,
       py::arg("max_reference_gap_s") = d.max_reference_gap_s, py::arg("estimate_bias") = d.estimate_bias,
       py::arg("estimate_lever_arm") = d.estimate_lever_arm, py::arg("lever_arm") = py::make_tuple(0.0, 0.0, 0.0),
-      py::arg("correlation_s") = d.correlation_s,
+      py::arg("correlation_s") = d.correlation_s, py::arg("bias_sigma_m") = d.bias_sigma_m,
       "By how much the stamps of a position stream are off against a reference trajectory in the same world (z up): "
       "t_reference = t_stream + offset_s. int64 (N,), float64 (N, 3) [m]; NaN rows are skipped. DataError names the "
       "index where times do not increase.");
