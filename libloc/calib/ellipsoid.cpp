@@ -22,7 +22,8 @@ constexpr std::array<EllipsoidMethod, 4> kMethods = {EllipsoidMethod::kLsq, Elli
                                                      EllipsoidMethod::kAls, EllipsoidMethod::kSphere};
 constexpr double kLowInliers = 0.8;
 constexpr double kFairInliers = 0.95;
-constexpr double kHighNoise = 0.05;  // of the radius: no sensor is that noisy, the field varied
+constexpr double kAbsurdNoise = 0.15;  // of the radius: these are not readings of one field
+constexpr double kHighNoise = 0.05;    // no sensor is that noisy, the field varied
 constexpr double kFairNoise = 0.03;
 constexpr double kHighAxisRatio = 2.0;
 constexpr std::int64_t kFewReadings = 30;
@@ -36,6 +37,29 @@ std::string percent(double ratio) {
 
 bool is_robust(EllipsoidMethod method) {
   return method == EllipsoidMethod::kRobust || method == EllipsoidMethod::kSphere;
+}
+
+// A device that lay still for most of a recording gives the same reading again and again, and the median of the
+// residuals would be that of this one: of each direction only so many readings tell the scale.
+void find_spread(NormalisedReadings& readings) {
+  constexpr std::size_t kLeast = 10;
+  const Eigen::Vector3d middle = readings.z.rowwise().minCoeff() / 2 + readings.z.rowwise().maxCoeff() / 2;
+  std::array<std::vector<Eigen::Index>, SphereCoverage::kCells> cells;
+  for (Eigen::Index i = 0; i < readings.z.cols(); ++i) {
+    const Eigen::Vector3d direction = readings.z.col(i) - middle;
+    if (direction.norm() > 0) cells[static_cast<std::size_t>(SphereCoverage::cell(direction))].push_back(i);
+  }
+  std::vector<std::size_t> sizes;
+  for (const auto& cell : cells) {
+    if (!cell.empty()) sizes.push_back(cell.size());
+  }
+  std::nth_element(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2), sizes.end());
+  const std::size_t most = std::max(kLeast, 3 * sizes[sizes.size() / 2]);
+  for (const auto& cell : cells) {
+    const std::size_t taken = std::min(cell.size(), most);
+    for (std::size_t k = 0; k < taken; ++k) readings.spread.push_back(cell[k * cell.size() / taken]);
+  }
+  std::sort(readings.spread.begin(), readings.spread.end());
 }
 
 NormalisedReadings normalise(const detail::Readings& readings, std::span<const double> weights, EllipsoidFit& fit) {
@@ -75,6 +99,7 @@ NormalisedReadings normalise(const detail::Readings& readings, std::span<const d
   out.z /= spread;
   out.origin += reach * mean;
   out.scale = reach * spread;
+  find_spread(out);
   return out;
 }
 
@@ -87,8 +112,9 @@ detail::QuarticMoments moments_of(const NormalisedReadings& readings) {
 double outlier_share(const NormalisedReadings& readings, const detail::RobustFit& fit) {
   std::vector<double> r(static_cast<std::size_t>(readings.z.cols()));
   detail::residuals(readings, fit.ellipsoid, r);
-  const auto far = [&](double v) { return std::abs(v) > 3.5 * fit.sigma; };
-  return static_cast<double>(std::count_if(r.begin(), r.end(), far)) / static_cast<double>(r.size());
+  const auto far = [&](Eigen::Index i) { return std::abs(r[static_cast<std::size_t>(i)]) > 3.5 * fit.sigma; };
+  const auto& spread = readings.spread;
+  return static_cast<double>(std::count_if(spread.begin(), spread.end(), far)) / static_cast<double>(spread.size());
 }
 
 // A sphere through the data, for where no ellipsoid can be had directly.
@@ -157,6 +183,27 @@ double variance_inflation(const std::vector<double>& r) {
   return time < 1 + 6 / std::sqrt(static_cast<double>(n)) ? 1 : time;
 }
 
+// What the true shape, which is not quite a sphere, does to a sphere's centre: nothing where all sides were seen, much
+// on a small cap. The shape is as the prior and the residuals of the sphere have it (one Gauss-Newton step).
+Matrix9 effect_of_shape(const Ellipsoid& e, double prior_sigma, const Matrix9& information, const Vector9& gradient,
+                        const Eigen::MatrixXd& basis, const Eigen::MatrixXd& sphere_cov) {
+  Eigen::Matrix<double, 6, 1> residual;
+  Eigen::Matrix<double, 6, 6> jacobian;
+  detail::shape_prior(e, prior_sigma, residual, jacobian);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> prior(jacobian.transpose() * jacobian);
+  Eigen::Matrix<double, 9, 5> shapes = Eigen::Matrix<double, 9, 5>::Zero();
+  shapes.bottomRows<6>() = prior.eigenvectors().rightCols<5>();  // the first one is the size, which has no prior
+  Eigen::Matrix<double, 9, 9> directions;
+  directions << basis, shapes;
+  Matrix9 normal = directions.transpose() * information * directions;
+  normal.diagonal().tail<5>() += prior.eigenvalues().tail<5>();
+  const Eigen::LDLT<Matrix9> ldlt(normal);
+  const Eigen::Matrix<double, 5, 1> shape = ldlt.solve(-(directions.transpose() * gradient)).tail<5>();
+  const Eigen::Matrix<double, 5, 5> shape_cov = ldlt.solve(Matrix9::Identity()).bottomRightCorner<5, 5>();
+  const Eigen::Matrix<double, 9, 5> effect = basis * sphere_cov * basis.transpose() * information * shapes;
+  return effect * (shape_cov + shape * shape.transpose()) * effect.transpose();
+}
+
 // Covariance of centre and matrix (normalised) from the curvature of the cost; for Tukey's loss with Huber's factors
 // ("Robust statistics", 1981, section 7.6). Also noise, inliers and residuals.
 Matrix9 covariance(const NormalisedReadings& readings, const Ellipsoid& e, const EllipsoidOptions& options,
@@ -167,8 +214,8 @@ Matrix9 covariance(const NormalisedReadings& readings, const Ellipsoid& e, const
   std::vector<double> r(n);
   detail::residuals(readings, e, r);
   const bool robust = is_robust(options.method);
-  std::vector<double> copy = r;
-  double sigma = detail::robust_scale(copy, parameters);
+  std::vector<double> buffer;
+  double sigma = detail::scale_of(readings, r, parameters, buffer);
   if (!robust) {
     const double sum = std::inner_product(r.begin(), r.end(), r.begin(), 0.0);
     sigma = std::sqrt(sum / std::max(1.0, static_cast<double>(n) - parameters));
@@ -177,6 +224,7 @@ Matrix9 covariance(const NormalisedReadings& readings, const Ellipsoid& e, const
   fit.noise_sigma = sigma * readings.scale;
 
   Matrix9 hessian = Matrix9::Zero();
+  Vector9 gradient = Vector9::Zero();
   double psi_square = 0;
   double psi_slope = 0;
   double inlier_square = 0;
@@ -201,6 +249,7 @@ Matrix9 covariance(const NormalisedReadings& readings, const Ellipsoid& e, const
       const double psi = r[i] / sigma * inside * inside;
       psi_square += psi * psi;
       psi_slope += inside * (1 - 5 * u * u);
+      gradient += psi / sigma * std::sqrt(readings.weights[static_cast<Eigen::Index>(i)]) * jacobian;
     }
     hessian.selfadjointView<Eigen::Lower>().rankUpdate(
         jacobian, readings.weights[static_cast<Eigen::Index>(i)] / (sigma * sigma));
@@ -239,19 +288,7 @@ Matrix9 covariance(const NormalisedReadings& readings, const Ellipsoid& e, const
       eigen.eigenvectors() * values.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
   const Matrix9 cov = basis * (inverse * spread * inverse) * basis.transpose();
   if (!sphere || options.shape_prior_sigma <= 0) return cov;
-  // The true shape is not quite a sphere. What that does to the centre depends on which part of it was seen: nothing
-  // all around, much on a small cap.
-  Eigen::Matrix<double, 6, 1> residual;
-  Eigen::Matrix<double, 6, 6> shape;
-  detail::shape_prior(e, options.shape_prior_sigma, residual, shape);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> axes(shape.transpose() * shape);
-  // The size has no prior, and is fitted.
-  Eigen::Matrix<double, 6, 1> variances = axes.eigenvalues().cwiseInverse();
-  variances[0] = 0;
-  const Eigen::Matrix<double, 6, 6> shape_cov =
-      axes.eigenvectors() * variances.asDiagonal() * axes.eigenvectors().transpose();
-  const Eigen::MatrixXd effect = basis * inverse * basis.transpose() * (slope * hessian).rightCols<6>();
-  return cov + effect * shape_cov * effect.transpose();
+  return cov + effect_of_shape(e, options.shape_prior_sigma, slope * hessian, gradient, basis, inverse);
 }
 
 Eigen::Matrix3d symmetric(const Eigen::Matrix<double, 6, 1>& w) {
@@ -345,7 +382,10 @@ void judge(const EllipsoidOptions& options, EllipsoidFit& fit) {
   }
   const double noise = fit.noise_sigma / fit.radius;
   if (noise > kFairNoise) {
-    q.lower_to(noise > kHighNoise ? Verdict::kWarn : Verdict::kFair,
+    const Verdict verdict = noise > kAbsurdNoise ? Verdict::kRefused
+                            : noise > kHighNoise ? Verdict::kWarn
+                                                 : Verdict::kFair;
+    q.lower_to(verdict,
                "the readings scatter by " + percent(noise) + " of the radius: the field was not the same everywhere");
   }
   if (fit.readings < kFewReadings) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 namespace loc::detail {
 
@@ -25,7 +26,8 @@ struct Ellipsoid {
 /// Readings that count, normalised: z = (x - origin) / scale; columns.
 struct NormalisedReadings {
   Eigen::Matrix3Xd z;
-  Eigen::VectorXd weights;  ///< mean 1
+  Eigen::VectorXd weights;           ///< mean 1
+  std::vector<Eigen::Index> spread;  ///< readings that tell the scale: of no direction far more than of the others
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   double scale = 1;
 };
@@ -76,6 +78,9 @@ RobustFit refine(const NormalisedReadings& readings, const Ellipsoid& start, con
 
 /// Residuals times the root of their weight. @param out of the size of the readings
 void residuals(const NormalisedReadings& readings, const Ellipsoid& e, std::span<double> out);
+/// robust_scale() of the residuals of those that tell it. @param all of all readings @param buffer for its work
+double scale_of(const NormalisedReadings& readings, std::span<const double> all, int parameters,
+                std::vector<double>& buffer);
 /// 1.4826 times the median of |r|, with the small-sample factor for that many parameters. Reorders its argument.
 double robust_scale(std::span<double> residuals, int parameters);
 /// Deviation of the relative axis lengths from their mean, divided by sigma: six residuals and their derivative by the

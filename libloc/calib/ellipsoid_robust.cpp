@@ -59,7 +59,7 @@ class Problem {
 
   double scale(const Ellipsoid& e) {
     residuals(readings_, e, residuals_);
-    return std::max(robust_scale(residuals_, parameters()), kSmallestSigma);
+    return std::max(scale_of(readings_, residuals_, parameters(), buffer_), kSmallestSigma);
   }
 
   double cost(const Ellipsoid& e, double sigma) {
@@ -107,6 +107,7 @@ class Problem {
   RobustOptions options_;
   Eigen::MatrixXd basis_;
   std::vector<double> residuals_;
+  std::vector<double> buffer_;
 };
 
 }  // namespace
@@ -144,6 +145,13 @@ void residuals(const NormalisedReadings& readings, const Ellipsoid& e, std::span
     if (!sampson_distance(e, readings.z.col(i), distance, nullptr)) distance = 1 / e.matrix.norm();
     out[static_cast<std::size_t>(i)] = distance * std::sqrt(readings.weights[i]);
   }
+}
+
+double scale_of(const NormalisedReadings& readings, std::span<const double> all, int parameters,
+                std::vector<double>& buffer) {
+  buffer.clear();
+  for (const Eigen::Index i : readings.spread) buffer.push_back(all[static_cast<std::size_t>(i)]);
+  return robust_scale(buffer, parameters);
 }
 
 double robust_scale(std::span<double> values, int parameters) {
@@ -227,12 +235,13 @@ RobustFit refine(const NormalisedReadings& readings, const Ellipsoid& start, con
 
 std::optional<Ellipsoid> fit_lmeds(const NormalisedReadings& all, std::uint64_t seed) {
   NormalisedReadings readings;
-  const Eigen::Index stride = (all.z.cols() + kLmedsReadings - 1) / kLmedsReadings;
-  const Eigen::Index n = (all.z.cols() + stride - 1) / stride;
+  const auto count = static_cast<Eigen::Index>(all.spread.size());
+  const Eigen::Index stride = (count + kLmedsReadings - 1) / kLmedsReadings;
+  const Eigen::Index n = stride > 0 ? (count + stride - 1) / stride : 0;
   if (n < kSubsetSize) return std::nullopt;
   readings.z.resize(3, n);
   readings.weights = Eigen::VectorXd::Ones(n);
-  for (Eigen::Index i = 0; i < n; ++i) readings.z.col(i) = all.z.col(i * stride);
+  for (Eigen::Index i = 0; i < n; ++i) readings.z.col(i) = all.z.col(all.spread[static_cast<std::size_t>(i * stride)]);
 
   std::vector<double> r(static_cast<std::size_t>(n));
   const auto median = [&](const Ellipsoid& e) {

@@ -234,6 +234,22 @@ TEST(Ellipsoid, BadReadingsAreCountedAndWeightsCount) {
   EXPECT_LT(with, 0.97 * without);
 }
 
+TEST(Ellipsoid, ARecordingThatIsMostlyRestDoesNotMislead) {
+  // A coarse sensor that lies still gives one reading thousands of times.
+  for (std::uint64_t seed = 20; seed < 30; ++seed) {
+    Random random(seed);
+    const EllipsoidSample s = simulate_ellipsoid({.name = "", .readings = 1500}, random);
+    Rows readings(5000, 3);
+    readings.topRows(1500) = s.readings;
+    for (Eigen::Index i = 1500; i < readings.rows(); ++i) readings.row(i) = s.readings.row(i % 3 == 0 ? 0 : 1);
+    constexpr double kQuantum = 0.6e-6;
+    readings = (readings / kQuantum).array().round() * kQuantum;
+    const EllipsoidFit fit = fit_with(readings, EllipsoidMethod::kRobust);
+    EXPECT_TRUE(fit.quality.usable()) << seed;
+    EXPECT_LT(test::sphere_error_deg(s, fit.centre, fit.matrix), 0.5) << seed;
+  }
+}
+
 TEST(Ellipsoid, CorrelatedReadingsHaveALargerSigma) {
   // Ten readings of each pose with the same error tell no more than one.
   Random random(12);
@@ -300,6 +316,20 @@ TEST(Ellipsoid, SphereKnowsWhatAShapeNearASphereDoesToItsCentre) {
       largest = std::max(largest, error.norm() / s.radius);
     }
     EXPECT_GE(inside, 90) << "cap " << cap << ", largest error " << largest;
+  }
+  // A sphere that is one is known as well as its readings say.
+  Random random(17);
+  for (int run = 0; run < 20; ++run) {
+    EllipsoidSample s = simulate_ellipsoid({.name = ""}, random);
+    const Eigen::Vector3d pole = random.direction();
+    for (Eigen::Index i = 0; i < s.readings.rows(); ++i) {
+      Eigen::Vector3d u = random.direction();
+      if (u.dot(pole) < -0.2) u = -u;  // a cap of 60 %
+      s.readings.row(i) = (s.centre + s.radius * (u + 0.005 * random.normal3())).transpose();
+    }
+    const EllipsoidFit fit = fit_with(s.readings, EllipsoidMethod::kSphere);
+    EXPECT_LT(fit.centre_sigma, 0.01);
+    EXPECT_LT((fit.centre - s.centre).norm(), 5 * fit.centre_sigma * s.radius);
   }
 }
 
