@@ -61,6 +61,18 @@ def test_units_and_times_in_the_heading(tmp_path):
     assert got.counts["rows.skipped.no_line_end"] == 1
 
 
+def test_each_column_has_its_own_unit(tmp_path):
+    path = write(tmp_path / "x.csv", "ax [g],ay [m/s^2],az [mg]\n1,2,3000\n")
+    got = read(path, "accelerometer").accelerometer
+    assert got.rows[0].tolist() == pytest.approx([9.80665, 2, 3 * 9.80665])
+    path = write(tmp_path / "y.csv", "ax [g],ay [raw],az [g]\n1,2,3\n")
+    with pytest.raises(DataError, match="x in g, y in counts, z in g: all three in counts, or none"):
+        read(path, "accelerometer")
+    path = write(tmp_path / "z.csv", "ax [g],ay [g],az\n1,2,3\n")
+    with pytest.raises(DataError, match="accelerometer, column of z: no unit"):
+        read(path, "accelerometer")
+
+
 def test_real_tables():
     folder = data_folder("magnetometer")
     got = read(folder / "ckexplorer_acc_mag.csv", accelerometer_unit="g", magnetometer_unit="gauss")

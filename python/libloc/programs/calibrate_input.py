@@ -251,17 +251,24 @@ def _read_table(path: Path, columns: list[_Column], heading: bool, options: Inpu
     for triad, at in places.items():
         if not values[triad]:
             continue
-        unit = _find_unit(triad, columns[at[0]].unit, options, f"{path}: columns of the {triad}")
+        units = [
+            _find_unit(triad, columns[i].unit, options, f"{path}: {triad}, column of {axis}")
+            for i, axis in zip(at, "xyz", strict=True)
+        ]
         rows = np.array(values[triad])
         stamps = None
         if time_at is not None:
             stamps = np.array(times[triad], dtype=np.int64)
         elif options.rate_hz is not None:
             stamps = np.rint(np.arange(len(rows)) * (1e9 / options.rate_hz)).astype(np.int64)
-        scaled = rows if unit == COUNTS else rows * UNITS[triad][unit]
-        setattr(
-            out, triad, Triad(np.ascontiguousarray(scaled), stamps, COUNTS if unit == COUNTS else SI[triad])
-        )
+        if COUNTS in units:
+            if any(unit != COUNTS for unit in units):
+                named = ", ".join(f"{axis} in {unit}" for axis, unit in zip("xyz", units, strict=True))
+                raise DataError(f"{path}: {triad}: {named}: all three in counts, or none")
+            setattr(out, triad, Triad(rows, stamps, COUNTS))
+        else:
+            rows = rows * [UNITS[triad][unit] for unit in units]  # each column has its own
+            setattr(out, triad, Triad(rows, stamps, SI[triad]))
         out.counts[f"{triad}.read"] = len(rows)
     if not any(getattr(out, triad) is not None for triad in TRIADS):
         raise DataError(f"{path}: no readings in it")
