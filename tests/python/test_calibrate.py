@@ -148,6 +148,16 @@ def test_what_is_refused_is_not_written(tmp_path, capsys):
     assert block == "magnetometer"
 
 
+@pytest.mark.parametrize(("unit", "said"), [("t", "uT read as T"), ("mgauss", "uT read as mgauss")])
+def test_a_wrong_unit_is_refused(tmp_path, capsys, unit, said):
+    distorted(tmp_path / "bent.csv", 4000)
+    text = (tmp_path / "bent.csv").read_text()
+    (tmp_path / "wrong.csv").write_text(text.replace("mx_ut,my_ut,mz_ut", f"mx_{unit},my_{unit},mz_{unit}"))
+    rig = tmp_path / "rig.yaml"
+    assert said in run(capsys, "magnetometer", tmp_path / "wrong.csv", "--out", rig, code=3)
+    assert not rig.exists()
+
+
 def test_a_damaged_rig_is_not_overwritten(tmp_path, capsys):
     distorted(tmp_path / "bent.csv", 2000)
     rig = tmp_path / "rig.yaml"
@@ -179,6 +189,8 @@ def test_data_errors(tmp_path, capsys):
         ["magnetometer", "x.csv", "--method", "magic"],
         ["magnetometer", "x.csv", "--field-ut", "-3"],
         ["magnetometer", "x.csv", "--field-ut", "nan"],
+        ["magnetometer", "x.csv", "--field-ut", "14"],
+        ["magnetometer", "x.csv", "--field-ut", "48000"],
         ["magnetometer", "x.csv", "--rate", "0"],
         ["magnetometer", "x.csv", "--out", "/"],
         ["magnetometer", "--live", "--duration", "0"],

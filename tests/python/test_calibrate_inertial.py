@@ -85,6 +85,27 @@ def test_few_poses_are_refused_or_warned_of(tmp_path, capsys):
     assert block == "imu.accelerometer"
 
 
+@pytest.mark.parametrize(
+    ("sensor", "heading", "wrong", "said"),
+    [
+        ("gyroscope", "wx_rad_s,wy_rad_s,wz_rad_s", "wx_deg_s,wy_deg_s,wz_deg_s", "rad/s read as deg/s"),
+        ("accelerometer", "ax_m_s2,ay_m_s2,az_m_s2", "ax_g,ay_g,az_g", "m/s^2 read as g"),
+        ("accelerometer", "ax_m_s2,ay_m_s2,az_m_s2", "ax_mg,ay_mg,az_mg", "m/s^2 read as mg"),
+    ],
+)
+def test_a_wrong_unit_is_refused(tmp_path, capsys, sensor, heading, wrong, said):
+    poses(tmp_path / "poses.csv")
+    text = (tmp_path / "poses.csv").read_text()
+    assert heading in text
+    (tmp_path / "wrong.csv").write_text(text.replace(heading, wrong))
+    rig = tmp_path / "rig.yaml"
+    assert said in run(capsys, sensor, tmp_path / "wrong.csv", "--out", rig, code=3)
+    assert not rig.exists()
+    run(capsys, sensor, tmp_path / "wrong.csv", "--out", rig, "--force")
+    ((block, verdict, _),) = libloc.read_rig(rig).doubts()
+    assert (block, verdict) == (f"imu.{sensor}", libloc.Verdict.REFUSED)
+
+
 def test_gyroscope_alone_gives_the_bias_and_keeps_the_scale(tmp_path, capsys):
     poses(tmp_path / "poses.csv", count=4)
     table = np.loadtxt(tmp_path / "poses.csv", delimiter=",", skiprows=1)
@@ -159,6 +180,22 @@ def test_noise(tmp_path, capsys):
     assert imu.rate_hz == RATE
     assert "not measured" in text
     assert {p.name for p in (tmp_path / "r").iterdir()} == {"report.html", "allan.png"}
+
+
+def test_noise_in_a_wrong_unit_is_warned_of(tmp_path, capsys):
+    write_still(tmp_path / "still.csv", 120)
+    text = (tmp_path / "still.csv").read_text()
+    assert "verdict fair" in run(capsys, "imu-noise", tmp_path / "still.csv")
+    (tmp_path / "g.csv").write_text(text.replace("ax_m_s2,ay_m_s2,az_m_s2", "ax_g,ay_g,az_g"))
+    said = run(capsys, "imu-noise", tmp_path / "g.csv")
+    assert "verdict warn" in said
+    assert "shows 96.17 m/s^2, gravity is 9.81 m/s^2. A wrong unit? It looks like m/s^2 read as g." in said
+    table = np.loadtxt(tmp_path / "still.csv", delimiter=",", skiprows=1)
+    lines = [f"{int(row[0])},{','.join(repr(v) for v in np.rad2deg(row[1:4]).tolist())}" for row in table]
+    (tmp_path / "deg.csv").write_text("time_ns,wx_rad_s,wy_rad_s,wz_rad_s\n" + "\n".join(lines) + "\n")
+    said = run(capsys, "imu-noise", tmp_path / "deg.csv")
+    assert "verdict warn" in said
+    assert "no gyroscope is so noisy. A wrong unit? It looks like deg/s read as rad/s." in said
 
 
 def test_noise_of_a_moving_device_is_refused(tmp_path, capsys):
@@ -317,6 +354,10 @@ def test_the_magnetic_model(tmp_path, capsys):
     text = run(capsys, "magnetometer", tmp_path / "own.csv", *singapore)
     assert "verdict warn" in text
     assert "the model says" in text
+    # What is said of the field is compared with the model, too.
+    text = run(capsys, "magnetometer", tmp_path / "own.csv", *place, "--field-ut", 30)
+    assert "verdict warn" in text
+    assert "--field-ut: The field is 30 uT, the model says 48." in text
 
 
 @pytest.mark.parametrize(

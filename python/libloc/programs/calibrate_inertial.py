@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 import libloc
 from libloc import DataError
+from libloc.programs import calibrate_plausible as plausible
 from libloc.programs import calibrate_plots as plots
 from libloc.programs import calibrate_plots_inertial as inertial_plots
 from libloc.programs.calibrate_input import COUNTS, GRAVITY, Readings, Triad, same_times
@@ -105,6 +106,13 @@ def _merge(outcome: Outcome, *qualities: libloc.Quality) -> None:
         outcome.reasons += [reason for reason in quality.reasons if reason not in outcome.reasons]
 
 
+def _doubt(outcome: Outcome, reasons: list[str]) -> None:
+    """What cannot be is refused."""
+    if reasons:
+        outcome.verdict = libloc.Verdict.REFUSED
+        outcome.reasons += reasons
+
+
 def _empty(block: str, summary: str, counts: dict[str, int], notes: list[str]) -> Outcome:
     return Outcome(
         block=block,
@@ -151,6 +159,7 @@ def calibrate_accelerometer(readings: Readings, options: argparse.Namespace) -> 
     ]
     triad = libloc.TriadCalibration()
     triad.bias, triad.matrix = fit.triad.bias, fit.triad.matrix
+    _doubt(out, plausible.scale_doubts("accelerometer", raw, triad.matrix))
     worst = libloc.Verdict(out.verdict)
     triad.quality = quality_of(
         fit.quality,
@@ -255,6 +264,8 @@ def calibrate_gyroscope(readings: Readings, options: argparse.Namespace) -> Outc
         ]
     triad = libloc.TriadCalibration()
     triad.bias, triad.matrix = fit.triad.bias, fit.triad.matrix
+    if fit.matrix_known:
+        _doubt(out, plausible.scale_doubts("gyroscope", raw, triad.matrix))
     sigma = np.sqrt(np.maximum(np.diag(fit.cov), 0)).reshape(3, 3) if fit.matrix_known else None
     triad.quality = quality_of(
         fit.quality,

@@ -10,6 +10,7 @@ import numpy as np
 import libloc
 from libloc.programs import calibrate_alignment as alignment
 from libloc.programs import calibrate_live
+from libloc.programs import calibrate_plausible as plausible
 from libloc.programs import calibrate_plots as plots
 from libloc.programs.calibrate_input import COUNTS, Readings, Triad
 from libloc.programs.calibrate_report import Outcome, Picture
@@ -43,6 +44,9 @@ def check_options(parser: argparse.ArgumentParser, options: argparse.Namespace) 
         value = getattr(options, name)
         if value is not None and not (np.isfinite(value) and value > 0):
             parser.error(f"--{name.replace('_', '-')} {value:g}: must be a positive number")
+    low, high = plausible.FIELD_RANGE_UT
+    if options.field_ut is not None and not low <= options.field_ut <= high:
+        parser.error(f"--field-ut {options.field_ut:g}: on earth it is between 22 and 67 uT")
     alignment.check_options(parser, options)
 
 
@@ -149,6 +153,15 @@ def _with_imu(
             dip,
         )
         _lower(out, triad, said.verdict, said.reasons)
+    if options.field_ut is not None:
+        said = check(
+            np.deg2rad(options.latitude),
+            np.deg2rad(options.longitude),
+            options.altitude,
+            options.date,
+            reference_norm(options),
+        )
+        _lower(out, triad, said.verdict, [f"--field-ut: {reason}" for reason in said.reasons])
     return triad
 
 
@@ -200,6 +213,9 @@ def calibrate(readings: Readings, options: argparse.Namespace) -> Outcome:
             "counts, "
             "too, not tesla."
         )
+    doubts = plausible.field_doubts(raw, fit.radius)
+    if doubts:
+        _lower(out, triad, libloc.Verdict.REFUSED, doubts)
     triad = _with_imu(out, fit, triad, readings, raw, options)
     out.tables = triad_tables(triad, raw, "hard iron", "soft iron, scale, cross-axis")
     out.pictures = _pictures(fit, raw, triad)

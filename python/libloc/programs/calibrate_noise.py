@@ -14,6 +14,7 @@ import numpy as np
 
 import libloc
 from libloc import DataError
+from libloc.programs import calibrate_plausible as plausible
 from libloc.programs import calibrate_plots_inertial as inertial_plots
 from libloc.programs.calibrate_input import COUNTS, Readings
 from libloc.programs.calibrate_report import Outcome, Picture, Table
@@ -69,6 +70,13 @@ def calibrate(readings: Readings, options: argparse.Namespace) -> Outcome:
     measured = fit.measured
     if not measured:
         return out
+    density = float("nan")
+    if "gyroscope_noise_density" in measured:
+        density = fit.noise.gyroscope_noise_density
+    doubts = plausible.rest_doubts(readings.accelerometer, density)
+    if doubts:
+        out.verdict = max(out.verdict, libloc.Verdict.WARN)
+        out.reasons = doubts + out.reasons
     if allan.gyroscope:
         out.tables.append(_table("gyroscope", allan.gyroscope, ("rad/s/√Hz", "rad/s", "rad/s²/√Hz")))
     if allan.accelerometer:
