@@ -158,6 +158,22 @@ def test_a_wrong_unit_is_refused(tmp_path, capsys, unit, said):
     assert not rig.exists()
 
 
+def test_counts_need_the_strength_of_the_field(tmp_path, capsys):
+    distorted(tmp_path / "bent.csv", 6000)
+    rows = np.loadtxt(tmp_path / "bent.csv", delimiter=",", skiprows=1)[:, 7:10]
+    np.savetxt(tmp_path / "counts.csv", rows / 0.3, fmt="%d", delimiter=",", header="mx,my,mz", comments="")
+    rig = tmp_path / "rig.yaml"
+    arguments = ("magnetometer", tmp_path / "counts.csv", "--magnetometer-unit", "counts", "--out", rig)
+    text = run(capsys, *arguments)
+    assert "verdict warn" in text
+    assert "Give --field-ut, or --latitude, --longitude and --date." in text
+    ((block, verdict, _),) = libloc.read_rig(rig).doubts()
+    assert (block, verdict) == ("magnetometer", libloc.Verdict.WARN)
+    text = run(capsys, *arguments, "--field-ut", 48.3)
+    assert "verdict ok" in text
+    assert libloc.read_rig(rig).doubts() == []
+
+
 def test_a_damaged_rig_is_not_overwritten(tmp_path, capsys):
     distorted(tmp_path / "bent.csv", 2000)
     rig = tmp_path / "rig.yaml"

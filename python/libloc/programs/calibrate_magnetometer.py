@@ -208,10 +208,15 @@ def calibrate(readings: Readings, options: argparse.Namespace) -> Outcome:
     ]
     triad = fit.triad()
     if raw.unit == COUNTS and reference_norm(options) == 0:
-        out.notes.append(
-            "The readings are counts and neither --field-ut nor a place was given: corrected readings are "
-            "counts, "
-            "too, not tesla."
+        _lower(
+            out,
+            triad,
+            libloc.Verdict.WARN,
+            [
+                "The readings are counts and the strength of the field was not given: corrected readings are "
+                "counts, too, where estimators expect tesla. Give --field-ut, or --latitude, --longitude and "
+                "--date."
+            ],
         )
     doubts = plausible.field_doubts(raw, fit.radius)
     if doubts:
