@@ -360,6 +360,24 @@ def test_the_magnetic_model(tmp_path, capsys):
     assert "--field-ut: The field is 30 uT, the model says 48." in text
 
 
+def test_the_order_of_calibrations_is_told(tmp_path, capsys):
+    """The magnetometer is turned to the IMU's calibrated axes: what comes too early or too late is said."""
+    write_csv(tmp_path / "own.csv", turning_body(8000))
+    poses(tmp_path / "poses.csv")
+    own, table, rig = tmp_path / "own.csv", tmp_path / "poses.csv", tmp_path / "rig.yaml"
+    early, late = "No rig with a calibrated", "run loc-calibrate magnetometer again"
+    assert f"{early} gyroscope and accelerometer" in run(capsys, "magnetometer", own, "--out", rig)
+    assert late in run(capsys, "accelerometer", table, "--out", rig)
+    assert f"{early} gyroscope was" in run(capsys, "magnetometer", own, "--out", rig)
+    assert late in run(capsys, "gyroscope", table, "--out", rig)
+    assert early not in run(capsys, "magnetometer", own, "--out", rig)
+    # One that keeps its own axes does not depend on the IMU.
+    text = run(capsys, "magnetometer", own, "--out", rig, "--no-alignment")
+    assert early not in text
+    assert late not in run(capsys, "accelerometer", table, "--out", rig)
+    assert late not in run(capsys, "accelerometer", table, "--out", tmp_path / "new.yaml")
+
+
 @pytest.mark.parametrize(
     "arguments",
     [

@@ -63,7 +63,7 @@ class Aligned:
     """What the IMU says about the magnetometer. result None: it could not be asked, the note says why."""
 
     result: libloc.MagnetometerAlignment | None = None
-    note: str = ""
+    note: str = ""  # of a result: what should be done first
 
 
 def _at_times_of_imu(
@@ -102,15 +102,17 @@ def align(
     if gyroscope.unit == COUNTS:
         return Aligned(note="The gyroscope is in counts: the rotation to the IMU is not known.")
     rates = gyroscope.rows
-    force = None
+    force, missing = None, ["gyroscope"]
     if accelerometer is not None and same_times(accelerometer, gyroscope):
         force = accelerometer.rows
+        missing.append("accelerometer")
     if options.out is not None and options.out.exists():
         # The rig's IMU may be calibrated already: its axes are what the magnetometer is turned to.
         imu = libloc.read_rig(options.out).imu
         if imu is not None:
             rates = _corrected(rates, imu.gyroscope)
             force = None if force is None else _corrected(force, imu.accelerometer)
+            missing = [name for name in missing if np.array_equal(getattr(imu, name).matrix, np.eye(3))]
     field = expected_field(options)
     dip = float("nan") if field is None else field.dip
     result = libloc.align_magnetometer(
@@ -120,7 +122,14 @@ def align(
         _at_times_of_imu(gyroscope.times_ns, raw.times_ns, _corrected(raw.rows, triad)),
         libloc.MagnetometerAlignmentOptions(expected_dip=dip),
     )
-    return Aligned(result)
+    note = ""
+    if missing:
+        note = (
+            f"No rig with a calibrated {' and '.join(missing)} was named with --out: the magnetometer was "
+            "turned to the IMU's axes as they were read. If you calibrate the IMU, do that first and then "
+            "this again."
+        )
+    return Aligned(result, note)
 
 
 def facts(result: libloc.MagnetometerAlignment) -> list[tuple[str, str]]:

@@ -1,9 +1,12 @@
 """loc-calibrate accelerometer and gyroscope: from a device that is put down in many poses.
 
-Move the device by hand into 15 or more poses, in all directions, and let it lie for a second or more in
-each; a table is best, no turntable is needed. Still poses are found by themselves. The accelerometer's
-poses give bias, scale and cross-axis (9 poses at least); a gyroscope in the same recording gets its bias
-from rest, and its scale and its alignment to the accelerometer from the turns between the poses.
+Move the device by hand into about 20 poses, in all directions, and let it lie for about two seconds in each,
+longer below 20 readings a second, as stillness is judged over 20 of them (four seconds at 10 Hz). A table is
+best, no turntable is needed. Still poses are found by themselves. The accelerometer's poses give bias, scale
+and cross-axis (9 poses at least); a gyroscope in the same recording gets its bias from rest, and its scale
+and its alignment to the accelerometer from the turns between the poses.
+
+A magnetometer is turned to the axes of the calibrated IMU: calibrate it after these two.
 """
 
 from __future__ import annotations
@@ -104,6 +107,22 @@ def _merge(outcome: Outcome, *qualities: libloc.Quality) -> None:
     outcome.verdict = max(outcome.verdict, *(quality.verdict for quality in qualities))
     for quality in qualities:
         outcome.reasons += [reason for reason in quality.reasons if reason not in outcome.reasons]
+
+
+def _note_magnetometer(outcome: Outcome, options: argparse.Namespace) -> None:
+    """A magnetometer that is in the rig already was turned to the axes that change now."""
+    if options.out is None or not options.out.exists():
+        return
+    magnetometer = libloc.read_rig(options.out).magnetometer
+    if magnetometer is None:
+        return
+    matrix = magnetometer.triad.matrix
+    # Symmetric: it keeps its own axes, or they are the IMU's by construction.
+    if np.abs(matrix - matrix.T).max() > 1e-9 * np.abs(matrix).max() or (np.diag(matrix) <= 0).any():
+        outcome.notes.append(
+            "The rig holds a magnetometer that was turned to the IMU's axes, which change with this: run "
+            "loc-calibrate magnetometer again."
+        )
 
 
 def _doubt(outcome: Outcome, reasons: list[str]) -> None:
@@ -207,6 +226,7 @@ def calibrate_accelerometer(readings: Readings, options: argparse.Namespace) -> 
         _set_rate(rig.imu, still)
 
     out.apply = apply
+    _note_magnetometer(out, options)
     return out
 
 
@@ -304,4 +324,6 @@ def calibrate_gyroscope(readings: Readings, options: argparse.Namespace) -> Outc
         _set_rate(rig.imu, still)
 
     out.apply = apply
+    if fit.matrix_known:
+        _note_magnetometer(out, options)
     return out

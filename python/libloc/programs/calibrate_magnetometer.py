@@ -120,6 +120,8 @@ def _with_imu(
         triad = libloc.aligned(triad, result)
         out.facts += alignment.facts(result)
         dip = result.dip
+        if found.note:
+            out.notes.append(found.note)
         _lower(out, triad, result.quality.verdict, list(result.quality.reasons))
     else:
         if result is not None:
