@@ -120,6 +120,7 @@ def test_gyroscope_alone_gives_the_bias_and_keeps_the_scale(tmp_path, capsys):
     libloc.update_rig(rig, known_scale)
     text = run(capsys, "gyroscope", tmp_path / "gyro.csv", "--out", rig)
     assert "verdict fair" in text
+    assert "Its axes" not in text
     gyroscope = libloc.read_rig(rig).imu.gyroscope
     assert np.abs(gyroscope.bias - GYRO_BIAS).max() < 3e-4
     assert np.array_equal(gyroscope.matrix, np.diag([1.1, 1.2, 1.3]))
@@ -128,6 +129,16 @@ def test_gyroscope_alone_gives_the_bias_and_keeps_the_scale(tmp_path, capsys):
     (tmp_path / "counts.csv").write_text(counts)
     text = run(capsys, "gyroscope", tmp_path / "counts.csv", "--gyroscope-unit", "counts", code=1)
     assert "in counts" in text
+
+
+def test_a_bias_alone_has_no_axes_to_speak_of(tmp_path, capsys):
+    """Too few turns for the matrix, although the accelerometer is there."""
+    poses(tmp_path / "poses.csv", count=4)
+    text = run(capsys, "gyroscope", tmp_path / "poses.csv")
+    assert "turns used" not in text
+    assert "Its axes" not in text
+    poses(tmp_path / "poses.csv")
+    assert "Its axes are those of the accelerometer" in run(capsys, "gyroscope", tmp_path / "poses.csv")
 
 
 def test_real_xsens(tmp_path, capsys):

@@ -251,10 +251,11 @@ def calibrate_gyroscope(readings: Readings, options: argparse.Namespace) -> Outc
         )
         fit = libloc.fit_gyroscope(times_ns, raw.rows, still.segments, gravity)
         _merge(out, still.quality, fit.quality)
-        notes.append(
-            "Its axes are those of the accelerometer as calibrated from this recording: run loc-calibrate "
-            "accelerometer on it, too."
-        )
+        if fit.matrix_known:
+            notes.append(
+                "Its axes are those of the accelerometer as calibrated from this recording: run "
+                "loc-calibrate accelerometer on it, too."
+            )
     if raw.unit == COUNTS and fit.bias_known and not fit.matrix_known:
         raise DataError(
             f"{readings.name}: the gyroscope is in counts and its scale could not be found: "
