@@ -22,6 +22,8 @@ constexpr double kDelayPrior = 0.05;  // [s]
 constexpr double kSlowTurn = 0.15;    // [rad] in an interval, up to which its mean readings belong together
 constexpr double kFlatDip = 10 * std::numbers::pi / 180;  // the sign of a smaller dip is not trusted
 constexpr std::size_t kLeastIntervals = 20;
+constexpr std::size_t kLeastGravity = 10;  // readings: the scatter of fewer says little
+constexpr double kGravitySigma = 0.01;     // [rad]: no accelerometer shows the vertical better while it is moved
 
 std::string degrees(double angle) {
   return to_text(std::round(angle * 180 / std::numbers::pi * 100) / 100) + " deg";
@@ -189,7 +191,8 @@ struct Weights {
   Eigen::VectorXd gravity;
 };
 
-/// One over the robust deviation of each kind of residual, times the root of Tukey's weight.
+/// One over the robust deviation of each kind of residual, times the root of Tukey's weight. A few readings of gravity
+/// agree by chance and would then count for more than all the turning: they are left out.
 Weights weights_at(const std::vector<FieldInterval>& intervals, const Eigen::Quaterniond& start,
                    const AlignmentVector& x) {
   std::vector<double> turn;
@@ -201,14 +204,17 @@ Weights weights_at(const std::vector<FieldInterval>& intervals, const Eigen::Qua
   }
   constexpr double kFloor = 1e-6;  // exact data must not divide by zero
   const double turn_sigma = std::max(kFloor, robust_sigma(turn));
-  const double gravity_sigma = gravity.empty() ? 1 : std::max(kFloor, robust_sigma(gravity));
+  const bool use_gravity = gravity.size() >= kLeastGravity;
+  const double gravity_scatter =
+      use_gravity ? robust_sigma(gravity) * small_sample_factor(static_cast<int>(gravity.size()) - 1) : 0;
+  const double gravity_sigma = std::max({kGravitySigma, turn_sigma, gravity_scatter});
   const auto n = static_cast<Eigen::Index>(intervals.size());
   Weights w{.turn = Eigen::VectorXd::Zero(n), .gravity = Eigen::VectorXd::Zero(n)};
   for (Eigen::Index k = 0; k < n; ++k) {
     const FieldInterval& interval = intervals[static_cast<std::size_t>(k)];
     const Eigen::Vector4d r = alignment_residual(interval, start, x, nullptr);
     w.turn[k] = std::sqrt(tukey_weight(r.head<3>().norm() / turn_sigma / std::sqrt(3.0))) / turn_sigma;
-    if (interval.has_gravity) w.gravity[k] = std::sqrt(tukey_weight(r[3] / gravity_sigma)) / gravity_sigma;
+    if (use_gravity && interval.has_gravity) w.gravity[k] = std::sqrt(tukey_weight(r[3] / gravity_sigma)) / gravity_sigma;
   }
   return w;
 }
@@ -478,9 +484,10 @@ MagnetometerAlignment align_magnetometer(std::span<const TimeNs> times_ns, const
   if (!sizes.empty()) out.residual_rms = root_mean_square(sizes);
   if (!dips.empty()) {
     out.dip = quantile(dips, 0.5);
-    out.dip_sigma = std::sqrt((*cov)(6, 6)) / std::max(0.05, std::cos(out.dip));
     for (double& d : dips) d -= out.dip;
     out.dip_scatter = robust_sigma(dips);
+    out.dip_sigma = dips.size() >= kLeastGravity ? std::sqrt((*cov)(6, 6)) / std::max(0.05, std::cos(out.dip))
+                                                 : std::hypot(out.sigma, kGravitySigma, out.dip_scatter);
   }
   if (std::abs(options.expected_dip) > kFlatDip && std::abs(out.dip) > kFlatDip) {
     out.mirror_checked = true;

@@ -69,7 +69,7 @@ struct MagnetometerAlignment {
   double second_axis_share = kUnknown;  ///< turning about a second axis relative to the first, 0 … 1
   std::int64_t intervals = 0;
   std::int64_t inliers = 0;
-  std::int64_t gravity_readings = 0;  ///< intervals that constraint 2 uses
+  std::int64_t gravity_readings = 0;  ///< intervals for constraint 2; below 10 they only give the dip
   std::int64_t not_finite = 0;        ///< rows
   std::int64_t repeated = 0;          ///< field readings equal to the one before: the sensor is slower
   std::int64_t too_fast = 0;          ///< rows with more than half a turn in one period: not a rate
