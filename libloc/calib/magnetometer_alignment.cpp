@@ -291,6 +291,28 @@ void name_axes(MagnetometerAlignment& out) {
   out.permuted = is_exchange && !nearest.isIdentity() && Eigen::AngleAxisd(rest).angle() < kNear;
 }
 
+/// The field may be reversed: most mirrored sensors then look turned by half a turn, or the dip has the wrong sign.
+void judge_unchecked_mirror(const MagnetometerAlignmentOptions& options, MagnetometerAlignment& out) {
+  constexpr double kHalfTurn = 160 * std::numbers::pi / 180;
+  const bool asked = !std::isnan(options.expected_dip);
+  const std::string cure = asked ? "" : ": give the place (expected_dip)";
+  if (out.dip < 0 && !asked) {
+    out.quality.lower_to(Verdict::kWarn, "The dip comes out as " + degrees(out.dip) +
+                                             ": either the field points up here (southern hemisphere) or the "
+                                             "magnetometer is mirrored and the field reversed" +
+                                             cure + ".");
+  } else if (out.angle > kHalfTurn) {
+    out.quality.lower_to(Verdict::kWarn,
+                         "The magnetometer is turned by " + degrees(out.angle) +
+                             " against the IMU, or mirrored and the field reversed, which was not checked" + cure +
+                             ".");
+  } else {
+    out.quality.lower_to(Verdict::kFair, asked ? "Whether the magnetometer is mirrored cannot be told: the dip is too "
+                                                 "small, or gravity was not seen."
+                                               : "Whether the magnetometer is mirrored was not checked" + cure + ".");
+  }
+}
+
 void judge(const MagnetometerAlignmentOptions& options, MagnetometerAlignment& out) {
   if (out.second_axis_share < options.least_second_axis) {
     out.quality.lower_to(Verdict::kRefused, "The device was turned about one axis only (second axis " +
@@ -319,11 +341,7 @@ void judge(const MagnetometerAlignmentOptions& options, MagnetometerAlignment& o
         "The magnetometer is mirrored (left-handed) against the IMU: an odd number of its axes has the "
         "wrong sign. The matrix corrects it.");
   }
-  if (!std::isnan(options.expected_dip) && !out.mirror_checked) {
-    out.quality.lower_to(Verdict::kFair,
-                         "Whether the magnetometer is mirrored cannot be told: the dip is too small, or "
-                         "gravity was not seen.");
-  }
+  if (!out.mirror_checked) judge_unchecked_mirror(options, out);
   if (out.permuted) {
     out.quality.lower_to(Verdict::kFair, "The magnetometer's axes are exchanged: body x y z are nearest to its " +
                                              out.axes + ". The matrix corrects it.");

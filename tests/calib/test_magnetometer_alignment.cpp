@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -151,6 +152,19 @@ TEST(MagnetometerAlignment, MirroredIsToldByTheSignOfTheDip) {
   EXPECT_FALSE(untold.mirror_checked);
   EXPECT_LT((untold.matrix + mirror).norm(), 0.01);
   EXPECT_NEAR(untold.dip, -kDip, 0.2 * kDegree);
+  EXPECT_EQ(untold.quality.verdict, Verdict::kWarn);
+  const auto says = [](const MagnetometerAlignment& a, const std::string& text) {
+    return std::any_of(a.quality.reasons.begin(), a.quality.reasons.end(),
+                       [&](const std::string& reason) { return reason.find(text) != std::string::npos; });
+  };
+  EXPECT_TRUE(says(untold, "southern hemisphere"));
+  EXPECT_TRUE(says(untold, "expected_dip"));
+  EXPECT_FALSE(says(untold, "corrects"));
+  // Without gravity there is no dip at all: the half turn is what is left to see.
+  const MagnetometerAlignment blind = align_magnetometer(r.body.times_ns, r.body.gyroscope, kAbsent, r.magnetometer);
+  EXPECT_EQ(blind.quality.verdict, Verdict::kWarn);
+  EXPECT_TRUE(says(blind, "mirrored"));
+  EXPECT_EQ(align(recording(3, Eigen::Matrix3d::Identity())).quality.verdict, Verdict::kFair);
 }
 
 TEST(MagnetometerAlignment, ALateMagnetometer) {
