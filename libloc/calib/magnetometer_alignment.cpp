@@ -342,10 +342,6 @@ void judge(const MagnetometerAlignmentOptions& options, MagnetometerAlignment& o
         "wrong sign. The matrix corrects it.");
   }
   if (!out.mirror_checked) judge_unchecked_mirror(options, out);
-  if (out.permuted) {
-    out.quality.lower_to(Verdict::kFair, "The magnetometer's axes are exchanged: body x y z are nearest to its " +
-                                             out.axes + ". The matrix corrects it.");
-  }
 }
 
 }  // namespace
