@@ -19,6 +19,9 @@ constexpr double kJitters = 10;                  // above the line, likewise
 constexpr std::int64_t kAverage = 500;           // samples over which the mean jitter and the period are averaged
 constexpr TimeNs kDoubtfulSpread = 500'000'000;  // between samples set aside that belong together
 
+constexpr int kBetweenEarly = 16;        // ordinary samples between two early ones that belong together
+constexpr TimeNs kSlewed = 100'000'000;  // smaller steps may be the beginning of a slew, or its end
+
 bool too_far(TimeNs difference) {
   return difference > kTooFar || difference < -kTooFar;
 }
@@ -83,12 +86,30 @@ bool ClockModel::update(TimeNs device_time_ns, TimeNs host_time_ns) {
     return true;
   }
   const double lateness = lateness_ns(sample);
+  watch(sample, lateness);
   const Doubt doubt = judge(sample, lateness);
   if (doubt != Doubt::kNone) return set_aside(sample, doubt);
-  doubt_ = Doubt::kNone;
-  aside_count_ = 0;
+  // After a small step back of the host many samples are late enough to look ordinary.
+  if (doubt_ != Doubt::kEarly || ++ordinary_since_aside_ > kBetweenEarly) {
+    doubt_ = Doubt::kNone;
+    aside_count_ = 0;
+  }
   take(sample, lateness);
   return true;
+}
+
+// A single absurd time, or a device that started anew, says nothing about the line.
+void ClockModel::watch(const Sample& sample, double lateness) {
+  const TimeNs step = saturating_difference(sample.device_ns, last_.device_ns);
+  if (step < -options_.reset_step_ns || too_far(step)) return;
+  if (too_far(saturating_difference(sample.host_ns, last_.host_ns))) return;
+  watch_.add(lateness, {line_.sigma_at_ns(sample.device_ns), jitter_ns_, noise_ns_});
+}
+
+ClockLine ClockModel::line() const {
+  ClockLine line = line_;
+  line.sigma_ns = std::hypot(line.sigma_ns, doubt_ns());
+  return line;
 }
 
 ClockModel::Doubt ClockModel::judge(const Sample& sample, double lateness) const {
@@ -99,6 +120,8 @@ ClockModel::Doubt ClockModel::judge(const Sample& sample, double lateness) const
   const double gate = static_cast<double>(options_.min_step_ns) + kSigmas * line_.sigma_at_ns(sample.device_ns);
   if (lateness < -gate) return Doubt::kEarly;
   if (lateness > gate + kJitters * jitter_ns_) return Doubt::kLate;
+  // Late by less than that, but without exception.
+  if (watch_.late_ns() > static_cast<double>(options_.min_step_ns)) return Doubt::kLate;
   return Doubt::kNone;
 }
 
@@ -116,6 +139,12 @@ bool ClockModel::set_aside(const Sample& sample, Doubt doubt) {
     doubt_ = doubt;
     aside_count_ = 0;
     aside_first_ = sample;
+    mark_ = mark_before_ = {sample.device_ns, watch_.late_ns()};
+  }
+  ordinary_since_aside_ = 0;
+  if (saturating_difference(sample.device_ns, mark_.device_ns) > full_width_ns_) {
+    mark_before_ = mark_;
+    mark_ = {sample.device_ns, watch_.late_ns()};
   }
   aside_[static_cast<std::size_t>(aside_count_) % kKept] = sample;
   kept_ = std::min(kKept, static_cast<std::size_t>(aside_count_) + 1);
@@ -149,14 +178,14 @@ void ClockModel::start_anew() {
     ++counts_.device_jumps;
     monotone_.restart_input();
   }
-  if (host_back) monotone_.forget();
-  // The crystal is the same as before.
-  const double sigma = std::hypot(line_.sigma_skew, options_.skew_walk * std::sqrt(options_.window_s));
+  // After a small step back time slows down until the step is made up for.
+  if (host_back && lateness_ns(aside_last_) < -static_cast<double>(kSlewed)) monotone_.forget();
+  const double sigma = skew_sigma_of_failed_line();
   const std::size_t kept = kept_;
   const std::size_t begin =
       aside_count_ > static_cast<std::int64_t>(kKept) ? static_cast<std::size_t>(aside_count_) % kKept : 0;
   const double jitter = jitter_ns_;
-  start(aside_[begin], line_.skew, std::min(sigma, options_.skew_sigma_ppm * 1e-6));
+  start(aside_[begin], line_.skew, sigma);
   jitter_ns_ = jitter;
   for (std::size_t i = 0; i < kept; ++i) {
     const Sample& sample = aside_[(begin + i) % kKept];
@@ -164,6 +193,26 @@ void ClockModel::start_anew() {
   }
   doubt_ = Doubt::kNone;
   aside_count_ = 0;
+}
+
+// How well the skew is known after a step. The crystal is the same as before; but where a small step may be part of a
+// slew, the line's skew is that of the slew, or the next line's will be.
+double ClockModel::skew_sigma_of_failed_line() const {
+  const double crystal = std::min(std::hypot(line_.sigma_skew, options_.skew_walk * std::sqrt(options_.window_s)),
+                                  options_.skew_sigma_ppm * 1e-6);
+  const double off = std::abs(lateness_ns(aside_last_));
+  if (doubt_ == Doubt::kDeviceBack || off > static_cast<double>(kSlewed)) return crystal;
+  double sigma = crystal;
+  const auto age = static_cast<double>(saturating_difference(aside_last_.device_ns, origin_ns_));
+  if (age > 0 && age < options_.window_s * 1e9) {
+    // Too young to have settled: it may have been wrong from the beginning.
+    sigma = std::hypot(sigma, off / age, settled_skew_ ? line_.skew - *settled_skew_ : 0);
+  }
+  const auto grown = static_cast<double>(saturating_difference(aside_last_.device_ns, mark_before_.device_ns));
+  if (doubt_ == Doubt::kLate && grown > 0) {
+    sigma = std::hypot(sigma, (watch_.late_ns() - mark_before_.late_ns) / grown);
+  }
+  return std::min(sigma, kLargestSkew);
 }
 
 void ClockModel::start(const Sample& first, double skew, double sigma_skew) {
@@ -178,6 +227,8 @@ void ClockModel::start(const Sample& first, double skew, double sigma_skew) {
   prior_time_ns_ = first.device_ns;
   jitter_ns_ = static_cast<double>(options_.initial_sigma_ns);
   line_ = {first.device_ns, first.host_ns, skew, jitter_ns_, sigma_skew, options_.skew_walk, 0, 0};
+  noise_ns_ = jitter_ns_;
+  watch_.reset();
   last_ = first;
 }
 
@@ -285,6 +336,9 @@ void ClockModel::fit() {
   line_.skew = std::clamp(envelope.slope * 1e-9, -kLargestSkew, kLargestSkew);
   line_.sigma_ns = envelope.sigma_value_ns;
   line_.sigma_skew = envelope.sigma_slope * 1e-9;
+  noise_ns_ = envelope.noise_ns;
+  watch_.shift(lateness_ns(newest) - before);
+  if (span >= options_.window_s / 2) settled_skew_ = line_.skew;
   line_.valid_from_ns = saturating_difference(bin(0).lowest.device_ns, full_width_ns_);
   // The mean lateness is above a line that has just moved.
   if (in_epoch_ < kBins) jitter_ns_ = std::max(0.0, jitter_ns_ + lateness_ns(newest) - before);
@@ -298,7 +352,7 @@ std::optional<ClockStamp> ClockModel::convert_once(TimeNs device_time_ns) const 
       device_time_ns <= aside_last_.device_ns) {
     return std::nullopt;
   }
-  return ClockStamp{line_.convert(device_time_ns), line_.sigma_at_ns(device_time_ns)};
+  return ClockStamp{line_.convert(device_time_ns), std::hypot(line_.sigma_at_ns(device_time_ns), doubt_ns())};
 }
 
 std::optional<ClockStamp> ClockModel::convert(TimeNs device_time_ns) {

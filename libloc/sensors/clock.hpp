@@ -15,12 +15,14 @@
 // Times are integers, doubles hold differences only. An update allocates nothing. Memory is bounded.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
 
 #include "libloc/core/time.hpp"
 #include "libloc/sensors/clock_line.hpp"
+#include "libloc/sensors/clock_watch.hpp"
 
 namespace loc {
 
@@ -32,10 +34,12 @@ struct ClockModelOptions {
   /// How fast the skew is taken to wander where there are no samples [1/sqrt(s)]: sigma of extrapolation. Crystal in
   /// a room that warms up: 1.5e-8.
   double skew_walk = 1.5e-8;
-  TimeNs min_step_ns = 1'000'000;        ///< Steps of either clock below this are not told from drift (they fade out).
+  /// Steps of either clock below this are not told from drift: they fade out within the window, and are in sigma while
+  /// they do.
+  TimeNs min_step_ns = 200'000;
   int step_samples = 20;                 ///< Samples in a row, all late by more than jitter, that make a step forward;
   double step_s = 5;                     ///< and they must span this, so that a jam of the bus is not taken for a step.
-  int early_samples = 5;                 ///< Samples in a row that come before they can: a step back of the host.
+  int early_samples = 5;                 ///< Samples that come before they can, with few others between: a step back.
   int reset_samples = 3;                 ///< Samples in a row after a step back of the device: it has started anew.
   TimeNs reset_step_ns = 1'000'000'000;  ///< A smaller step back of device time is a sample out of order.
   double max_extrapolation_s = 60;       ///< So long after the last sample the model still answers.
@@ -80,7 +84,8 @@ class ClockModel {
   bool doubtful() const { return aside_count_ >= 3; }
   /// The last sample was set aside; what it was shows with the next ones.
   bool undecided() const { return aside_count_ > 0; }
-  const ClockLine& line() const { return line_; }  ///< what is known now; meaningful when ready()
+  /// What is known now; meaningful when ready(). While the last samples do not fit, sigma holds by how much.
+  ClockLine line() const;
   /// Mean lateness of samples above the line [ns].
   double mean_jitter_ns() const { return jitter_ns_; }
   /// Counts the lines that were started: 0 before the first sample, +1 with each reset, jump or step.
@@ -104,8 +109,11 @@ class ClockModel {
   enum class Doubt : std::uint8_t { kNone, kDeviceBack, kEarly, kLate };
 
   double lateness_ns(const Sample& sample) const;
+  double doubt_ns() const { return std::max(watch_.late_ns(), watch_.early_ns()); }
+  void watch(const Sample& sample, double lateness);
   bool below(const Sample& a, const Sample& b) const;
   Doubt judge(const Sample& sample, double lateness) const;
+  double skew_sigma_of_failed_line() const;
   bool set_aside(const Sample& sample, Doubt doubt);
   void start_anew();
   void start(const Sample& first, double skew, double sigma_skew);
@@ -130,6 +138,16 @@ class ClockModel {
   double prior_sigma_skew_ = 0;
   TimeNs prior_time_ns_ = 0;  // device time for which the prior holds
   double jitter_ns_ = 0;      // mean lateness
+  double noise_ns_ = 0;       // of the least late samples
+  LatenessWatch watch_;
+  // How late samples of the run were before, to see whether that grows: a slew.
+  struct Mark {
+    TimeNs device_ns = 0;
+    double late_ns = 0;
+  };
+  Mark mark_before_;
+  Mark mark_;
+  std::optional<double> settled_skew_;  // of the last line that had time to settle
   std::int64_t in_epoch_ = 0;
   double period_ns_ = 0;  // typical step of device time
   Sample last_;
@@ -138,6 +156,7 @@ class ClockModel {
   std::array<Sample, kKept> aside_{};
   std::size_t kept_ = 0;
   std::int64_t aside_count_ = 0;
+  int ordinary_since_aside_ = 0;
   Sample aside_first_;
   Sample aside_last_;
   Doubt doubt_ = Doubt::kNone;

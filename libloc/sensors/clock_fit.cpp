@@ -55,7 +55,7 @@ Envelope fit_envelope(std::span<const EnvelopePoint> points, const EnvelopePrior
     double lowest = points.front().y_ns;
     for (const EnvelopePoint& p : points) lowest = std::min(lowest, p.y_ns);
     // Not lowered by the mean error, which is known badly by now: sigma covers it (root mean square of an exponential).
-    return {lowest, prior.slope, std::numbers::sqrt2 * prior.noise_ns, prior.sigma_slope};
+    return {lowest, prior.slope, std::numbers::sqrt2 * prior.noise_ns, prior.sigma_slope, prior.noise_ns};
   }
 
   // What few points say of their own error is doubtful: the prior counts as three more.
@@ -111,6 +111,7 @@ Envelope fit_envelope(std::span<const EnvelopePoint> points, const EnvelopePrior
   // The mean error itself is known to one part in sqrt(n).
   out.sigma_value_ns = std::sqrt(cov(0, 0) * misfit + noise * noise / static_cast<double>(n));
   out.sigma_slope = std::sqrt(cov(1, 1) * misfit) / span;
+  out.noise_ns = noise;
   return out;
 }
 

@@ -22,6 +22,7 @@ struct Envelope {
   double slope = 0;     ///< [ns/s] at x = 0
   double sigma_value_ns = 0;
   double sigma_slope = 0;
+  double noise_ns = 0;  ///< mean error of a point
 };
 
 /// Theil-Sen slope, then least squares of a parabola with the prior, points far off that line left out; at last the

@@ -178,6 +178,94 @@ TEST(Clock, small_host_steps_are_found) {
   }
 }
 
+struct ShiftRun {
+  double unaware_s = 0;       // answers that are off by more than 5 sigma
+  double rms_over_sigma = 0;  // of all others; and of all but the first second of the event and that after its end
+  double rms_after_1_s = 0;
+  double final_error_us = 0;
+  std::int64_t backward_steps = 0;
+  ClockCounts counts;
+};
+
+// The host's clock is set by so much after 300 s, at once or by so many ppm; 450 s in all.
+ShiftRun run_shift(double amount_ms, double rate_ppm, std::uint64_t seed) {
+  std::vector<double> scaled;
+  std::vector<double> scaled_after;
+  std::vector<double> last_us;
+  ShiftRun out;
+  ClockModel model;
+  TimeNs last = kMin;
+  const double duration_s = rate_ppm > 0 ? 1e3 * std::abs(amount_ms) / rate_ppm : 1e-9;
+  const auto samples = simulate_clock(ClockSimulation::usb_imu(), 450, Random(seed));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const double s = static_cast<double>(i) / 200;
+    const auto shift = static_cast<TimeNs>(1e6 * amount_ms * std::clamp((s - 300) / duration_s, 0.0, 1.0));
+    model.update(samples[i].device_time_ns, samples[i].host_time_ns + shift);
+    const auto stamp = model.convert(samples[i].device_time_ns);
+    if (!stamp) continue;
+    if (stamp->time_ns <= last) ++out.backward_steps;
+    last = stamp->time_ns;
+    if (s < 120) continue;
+    const auto error = static_cast<double>(stamp->time_ns - samples[i].earliest_host_ns - shift);
+    const double z = error / stamp->sigma_ns;
+    if (std::abs(z) > 5) {
+      out.unaware_s += 1.0 / 200;
+    } else {
+      scaled.push_back(z);
+    }
+    const bool begins = s >= 300 && s <= 301;
+    const bool ends = s >= 300 + duration_s && s <= 301 + duration_s;
+    if (!begins && !ends) scaled_after.push_back(z);
+    if (s > 445) last_us.push_back(1e-3 * std::abs(error));
+  }
+  out.rms_over_sigma = root_mean_square(scaled);
+  out.rms_after_1_s = root_mean_square(scaled_after);
+  out.final_error_us = mean(last_us);
+  out.counts = model.counts();
+  return out;
+}
+
+// Jitter of 1 ms hides a late step until about 20 ms / step samples have come; no one can know before that.
+TEST(Clock, host_steps_down_to_a_millisecond_are_in_sigma_at_once) {
+  for (const double step_ms : {0.8, -0.8, 3.0, -3.0, 10.0, -10.0, 30.0, -30.0, 3000.0}) {
+    for (const std::uint64_t seed : {1U, 2U, 3U}) {
+      const ShiftRun r = run_shift(step_ms, 0, seed);
+      const double unaware = step_ms == 0.8 ? 0.4 : step_ms == 3 ? 0.12 : 0.06;
+      EXPECT_LE(r.unaware_s, unaware) << step_ms << " ms, seed " << seed;
+      EXPECT_NEAR(r.rms_over_sigma, 1, 0.35) << step_ms << " ms, seed " << seed;
+      EXPECT_NEAR(r.rms_after_1_s, 1, 0.35) << step_ms << " ms, seed " << seed;
+      EXPECT_EQ(r.counts.host_steps_forward, step_ms > 0 ? 1 : 0) << step_ms << " ms, seed " << seed;
+      EXPECT_EQ(r.counts.host_steps_back, step_ms < 0 ? 1 : 0) << step_ms << " ms, seed " << seed;
+      EXPECT_EQ(r.counts.device_jumps, 0);
+      EXPECT_EQ(r.backward_steps, 0) << step_ms;
+      EXPECT_LT(r.final_error_us, 6) << step_ms;
+    }
+  }
+}
+
+TEST(Clock, slews_of_the_host_are_in_sigma_soon) {
+  struct Slew {
+    double amount_ms;
+    double rate_ppm;
+    double unaware_s;
+    double rms;
+  };
+  // adjtime slews by 500 ppm, chrony by up to 83333 ppm. A slew shows when jitter no longer explains its beginning.
+  for (const Slew& slew : {Slew{5, 500, 4, 3}, Slew{20, 500, 4, 3}, Slew{10, 83333, 0.1, 1.4}, Slew{-5, 500, 8, 3},
+                           Slew{-20, 500, 8, 3}, Slew{-10, 83333, 0.1, 1.4}, Slew{5, 1000, 1, 2}}) {
+    for (const std::uint64_t seed : {1U, 2U, 3U}) {
+      const ShiftRun r = run_shift(slew.amount_ms, slew.rate_ppm, seed);
+      EXPECT_LE(r.unaware_s, slew.unaware_s) << slew.amount_ms << " ms, " << slew.rate_ppm << " ppm, seed " << seed;
+      EXPECT_LT(r.rms_over_sigma, 1.5) << slew.amount_ms << " ms, " << slew.rate_ppm << " ppm, seed " << seed;
+      EXPECT_LT(r.rms_after_1_s, slew.rms) << slew.amount_ms << " ms, " << slew.rate_ppm << " ppm, seed " << seed;
+      EXPECT_GE(r.counts.host_steps_forward + r.counts.host_steps_back, 1);
+      EXPECT_LE(r.counts.host_steps_forward + r.counts.host_steps_back, 5) << slew.amount_ms;
+      EXPECT_EQ(r.backward_steps, 0);
+      EXPECT_LT(r.final_error_us, 6) << slew.amount_ms << " ms, " << slew.rate_ppm << " ppm, seed " << seed;
+    }
+  }
+}
+
 TEST(Clock, device_that_jumps_ahead) {
   ClockSimulation simulation = ClockSimulation::usb_imu();
   simulation.events = {{Kind::kDeviceReset, 200, 5000 * kSecond}};

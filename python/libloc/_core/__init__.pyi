@@ -1581,7 +1581,7 @@ class ClockModel:
     """
     def __init__(self, **kwargs) -> None:
         """
-        Options as keywords: window_s=120, skew_sigma_ppm=100, initial_sigma_ns=10_000_000, skew_walk=1.5e-8, min_step_ns=1_000_000, step_samples=20, step_s=5, early_samples=5, reset_samples=3, reset_step_ns=1_000_000_000, max_extrapolation_s=60. ValueError names one that is out of range.
+        Options as keywords: window_s=120, skew_sigma_ppm=100, initial_sigma_ns=10_000_000, skew_walk=1.5e-8, min_step_ns=200_000, step_samples=20, step_s=5, early_samples=5, reset_samples=3, reset_step_ns=1_000_000_000, max_extrapolation_s=60. ValueError names one that is out of range.
         """
     def convert(self, device_times_ns: numpy.typing.NDArray[numpy.int64]) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
         """
