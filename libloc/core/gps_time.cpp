@@ -35,6 +35,8 @@ constexpr struct {
 };
 // Expiry of the leap-seconds.list that the table was compared with (tzdata 2025b).
 constexpr CivilDate kKnownUntil{2026, 6, 28};
+constexpr CivilDate kTableChecked{2026, 11, 22};
+constexpr std::int64_t kReferenceDays = 2;  // Clocks of hosts are a day off when their time zone is wrong.
 
 std::chrono::year_month_day ymd(const CivilDate& date) {
   return std::chrono::year{date.year} / std::chrono::month{static_cast<unsigned>(date.month)} /
@@ -274,16 +276,15 @@ std::int32_t full_week(std::int32_t truncated_week, TimeNs reference_gps_ns, int
   return week < 0 ? week + period : week;
 }
 
+CivilDate library_date() {
+  return kTableChecked;
+}
+
 CivilDate resolve_rollover(const CivilDate& date, const CivilDate& reference) {
-  const std::int64_t difference = gps_day(reference) - gps_day(date);
-  const std::int64_t half = difference >= 0 ? kRolloverDays / 2 : -kRolloverDays / 2;
-  const std::int64_t nearest = (difference + half) / kRolloverDays * kRolloverDays;
-  // At the ends of the years that exist here the nearest may lie outside.
-  for (const std::int64_t days : {nearest, nearest + kRolloverDays, nearest - kRolloverDays}) {
-    const CivilDate out = date_from_gps_day(gps_day(date) + days);
-    if (is_date(out)) return out;
-  }
-  return date;
+  const std::int64_t ahead = gps_day(reference) + kReferenceDays - gps_day(date);
+  if (ahead < kRolloverDays) return date;
+  const CivilDate out = date_from_gps_day(gps_day(date) + ahead / kRolloverDays * kRolloverDays);
+  return is_date(out) ? out : date;
 }
 
 std::int32_t full_year(std::int32_t two_digits, std::int32_t reference_year) {

@@ -119,8 +119,14 @@ TimeNs gps_from_week(const GpsWeekTime& week_time);
 /// week: 10 (GPS L1: rolled over in 1999, 2019, next 2038) or 13. @throws std::invalid_argument when it has more bits.
 std::int32_t full_week(std::int32_t truncated_week, TimeNs reference_gps_ns, int bits = 10);
 
+/// Day of the last check of the table of leap seconds: nothing that happens now is before it, whatever the host's clock
+/// says.
+CivilDate library_date();
+
 /// Receivers whose firmware has outlived its 1024 weeks tell a date that is 7168 days (or a multiple) too early.
-/// @return the date plus the multiple of 7168 days that brings it nearest to the reference.
+/// @param reference a day at or after that of the data, by less than 19 years
+/// @return the latest date that is a multiple of 7168 days (or none) after the one told and at most two days after the
+/// reference; a date that is later than that already stays as it is. Never an earlier one.
 CivilDate resolve_rollover(const CivilDate& date, const CivilDate& reference);
 
 /// The year that ends in two_digits, from reference - 50 to reference + 49. Without reference the years of GPS so far:

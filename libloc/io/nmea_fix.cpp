@@ -18,6 +18,8 @@ constexpr double kUnknownDop = 50;
 // RMC and GGA of one epoch tell the same position but for their decimals.
 constexpr double kSamePosition = 20;  // [m]
 constexpr double kEarthRadius = 6.4e6;
+// So long after midnight a receiver may go on to tell the date of the day before.
+constexpr TimeNs kDateMayBeLate = 10 * kSecond;
 // A receiver that was silent for longer, by the host's clock, may have passed a midnight unseen.
 constexpr TimeNs kLongestSilence = kHour;
 
@@ -59,6 +61,13 @@ void NmeaFixOptions::check() const {
     require(std::abs(*geoid_separation) <= 200, "geoid_separation", *geoid_separation, "must be -200 to 200 m");
   }
   require_not_negative("sigma_per_dop", sigma_per_dop);
+}
+
+std::string past_leap_table_remark(const CivilDate& date, const LeapSeconds& table) {
+  return to_text(date) + " is past the table of leap seconds, which is known until " + to_text(table.known_until()) +
+         ": GPS - UTC = " + std::to_string(table.gps_minus_utc(date)) +
+         " s is taken, wrong by whole seconds if there was a leap second since; a newer table (package tzdata, or a "
+         "leap-seconds.list) or the difference itself settles it";
 }
 
 NmeaFixAssembler::NmeaFixAssembler(const NmeaFixOptions& options, GpsTimeEventHandler on_event)
@@ -155,6 +164,7 @@ void NmeaFixAssembler::label(const NmeaSentence& sentence) {
   }
   const TimeNs time = time_of_day(sentence);
   if (!date || time == kNoTime) return;
+  if (is_late(*date, time)) date = date_from_gps_day(gps_day(*date) + 1);
   const std::optional<TimeNs> gps = gps_time(*date, time);
   if (!gps) return;
   epoch_.labelled = true;
@@ -243,6 +253,14 @@ std::optional<CivilDate> NmeaFixAssembler::date_of(const NmeaZda& zda) const {
   return mended(zda.date);
 }
 
+// Right after midnight, with the date of yesterday: the last epoch was seconds ago only if it is today.
+bool NmeaFixAssembler::is_late(const CivilDate& date, TimeNs time_of_day_ns) const {
+  if (!last_date_ || time_of_day_ns >= kDateMayBeLate || gps_day(date) > gps_day(*last_date_)) return false;
+  const TimeNs since_last = (gps_day(date) + 1 - gps_day(*last_date_)) * kDay + time_of_day_ns - last_time_of_day_ns_;
+  const CivilDate next = date_from_gps_day(gps_day(date) + 1);
+  return since_last > 0 && since_last <= kDateMayBeLate && is_date(next);
+}
+
 // An epoch that tells no date is on the day of the last one, or on the next when midnight was between them.
 std::optional<CivilDate> NmeaFixAssembler::carried_date(const Epoch& epoch) const {
   if (!last_date_) return std::nullopt;
@@ -282,6 +300,8 @@ void NmeaFixAssembler::find_time(const Epoch& epoch, bool valid, GpsMeasurement&
     return;
   }
   std::optional<CivilDate> date = from_rmc ? from_rmc : from_zda;
+  const bool late = date && is_late(*date, epoch.time_of_day_ns);
+  if (late) date = date_from_gps_day(gps_day(*date) + 1);
   if (!date) date = carried_date(epoch);
   if (!date) {
     if (valid) ++counts_.no_date;
@@ -298,12 +318,26 @@ void NmeaFixAssembler::find_time(const Epoch& epoch, bool valid, GpsMeasurement&
   last_date_ = date;
   last_time_of_day_ns_ = epoch.time_of_day_ns;
   last_host_time_ns_ = epoch.host_time_ns;
-  if (!options_.leap_seconds.known_on(*date)) ++counts_.past_leap_table;
+  if (late) ++counts_.date_late;
   // 7168 days are no whole number of years: RMC's day and month tell, too.
   const bool zda_mended = from_zda && *from_zda != epoch.zda->date;
   const bool rmc_mended =
       from_rmc && (from_rmc->month != epoch.rmc->date.month || from_rmc->day != epoch.rmc->date.day);
-  if (zda_mended || rmc_mended) ++counts_.rollover_mended;
+  remark(epoch, *date, zda_mended || rmc_mended);
+}
+
+void NmeaFixAssembler::remark(const Epoch& epoch, const CivilDate& date, bool mended) {
+  if (mended && counts_.rollover_mended++ == 0 && options_.on_remark) {
+    CivilDate told = epoch.rmc ? epoch.rmc->date : epoch.zda->date;
+    if (told.year < 100) told.year = full_year(told.year, options_.reference_date->year);
+    options_.on_remark("the receiver tells " + to_text(told) + ", which is taken for " + to_text(date) +
+                       ", 1024 weeks (or a multiple) later, as its firmware seems to be past its rollover; if the data "
+                       "are as old as that, a reference date of their time keeps the date");
+  }
+  if (options_.leap_seconds.known_on(date)) return;
+  if (counts_.past_leap_table++ == 0 && options_.on_remark) {
+    options_.on_remark(past_leap_table_remark(date, options_.leap_seconds));
+  }
 }
 
 void NmeaFixAssembler::fill_position(const Epoch& epoch, GpsMeasurement& fix) const {
@@ -391,6 +425,7 @@ void NmeaFixAssembler::add_to(NamedCounts& counts) const {
   add("gps.late_sentence", counts_.late);
   add("gps.impossible_time", counts_.impossible_time);
   add("gps.rollover_mended", counts_.rollover_mended);
+  add("gps.date_late", counts_.date_late);
   add("gps.time_labels", counts_.labels);
 }
 

@@ -6,13 +6,14 @@
 // separation (its own geoid model is needed, no other), and in a 2-D fix, whose altitude is an assumption. Covariance
 // comes from GST, or, when asked for, from the dilution of precision; otherwise it is not known. Time is UTC; the date
 // comes from RMC (two-digit year) or ZDA of the epoch, otherwise it is carried on from the last epoch that had one,
-// over midnight too. Sentences without time (GSA, VTG) belong to the epoch of the timed one before them. A receiver
-// that sends VTG first in its burst and no RMC can mislead this in a log; live, the pause between bursts parts the
-// epochs.
+// over midnight too; a date that changes up to ten seconds after midnight is taken as changed. Sentences without time
+// (GSA, VTG) belong to the epoch of the timed one before them. A receiver that sends VTG first in its burst and no RMC
+// can mislead this in a log; live, the pause between bursts parts the epochs.
 #pragma once
 
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "libloc/core/gps_time.hpp"
 #include "libloc/io/nmea.hpp"
@@ -23,11 +24,18 @@ namespace loc {
 
 /// Called for every GPS time event, from the thread that reads the source.
 using GpsTimeEventHandler = std::function<void(const GpsTimeEvent&)>;
+/// Called once per kind with what someone should know about the dates: that they were mended, that they are past the
+/// table of leap seconds, that a log steps back. A sentence without a full stop.
+using DateRemarkHandler = std::function<void(const std::string&)>;
+
+/// The remark about a date that the table does not know.
+std::string past_leap_table_remark(const CivilDate& date, const LeapSeconds& table);
 
 struct NmeaFixOptions {
   LeapSeconds leap_seconds = LeapSeconds();
-  /// A day within 10 years of the recording (live: the host's). Resolves two-digit years and brings the dates of
-  /// receivers back that have outlived 1024 weeks. Without it years are 1980 to 2079 and dates are taken as told.
+  /// A day at or after that of the data, by less than 19 years (live: the host's, or library_date() if that is later).
+  /// Resolves two-digit years and mends the dates of receivers that have outlived 1024 weeks, see resolve_rollover().
+  /// Without it years are 1980 to 2079 and dates are taken as told.
   std::optional<CivilDate> reference_date = std::nullopt;
   /// Used where the receiver does not tell it [m]; 0 takes its altitude as that above the ellipsoid.
   std::optional<double> geoid_separation = std::nullopt;
@@ -36,6 +44,7 @@ struct NmeaFixOptions {
   double sigma_per_dop = 0;
   /// Accept dead-reckoned, manual and simulator positions as 2-D or 3-D fixes.
   bool accept_not_measured = false;
+  DateRemarkHandler on_remark = {};
 
   /// @throws std::invalid_argument naming the field and its value.
   void check() const;
@@ -60,7 +69,8 @@ class NmeaFixAssembler {
   TimeNs told_gps_time_ns() const { return told_gps_time_ns_; }
   /// "gps.epochs", "gps.no_fix", "gps.no_date", "gps.date_past_leap_table", and what was contradictory or given up:
   /// "gps.contradictory", "gps.not_measured", "gps.repeated_sentence", "gps.late_sentence", "gps.impossible_time",
-  /// "gps.rollover_mended", "gps.time_labels"; those that did not occur are left out, but epochs and no_fix.
+  /// "gps.rollover_mended", "gps.date_late", "gps.time_labels"; those that did not occur are left out, but epochs and
+  /// no_fix.
   void add_to(NamedCounts& counts) const;
 
  private:
@@ -89,6 +99,7 @@ class NmeaFixAssembler {
     std::int64_t late = 0;
     std::int64_t impossible_time = 0;
     std::int64_t rollover_mended = 0;
+    std::int64_t date_late = 0;
     std::int64_t labels = 0;
   };
 
@@ -103,8 +114,10 @@ class NmeaFixAssembler {
   CivilDate mended(const CivilDate& date) const;
   std::optional<CivilDate> date_of(const NmeaRmc& rmc) const;
   std::optional<CivilDate> date_of(const NmeaZda& zda) const;
+  bool is_late(const CivilDate& date, TimeNs time_of_day_ns) const;
   std::optional<CivilDate> carried_date(const Epoch& epoch) const;
   void find_time(const Epoch& epoch, bool valid, GpsMeasurement& fix);
+  void remark(const Epoch& epoch, const CivilDate& date, bool mended);
   std::optional<TimeNs> gps_time(const CivilDate& date, TimeNs time_of_day_ns) const;
   void fill_position(const Epoch& epoch, GpsMeasurement& fix) const;
   void fill_covariance(const Epoch& epoch, GpsMeasurement& fix) const;

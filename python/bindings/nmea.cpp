@@ -143,7 +143,8 @@ void bind_nmea(py::module_& m) {
         return parse(std::string_view(data), options);
       },
       "Fixes in the bytes of a receiver; anything may stand between the sentences. reference_date: a datetime.date "
-      "within 10 years of the data, which resolves two-digit years and mends the dates of receivers that are past "
+      "at or after the data by less than 19 years, which resolves two-digit years and mends the dates of receivers "
+      "that are past "
       "their "
       "1024 weeks. leap_seconds: GPS minus UTC instead of the library's table. geoid_separation [m]: where the "
       "receiver "

@@ -209,8 +209,12 @@ TEST(GpsWeek, DatesOfAgedReceiversAreBroughtBack) {
   EXPECT_EQ(resolve_rollover({2007, 4, 10}, {2026, 11, 22}), (CivilDate{2026, 11, 24}));
   EXPECT_EQ(resolve_rollover({1987, 8, 25}, {2026, 11, 22}), (CivilDate{2026, 11, 24})) << "two rollovers";
   EXPECT_EQ(resolve_rollover({2026, 11, 22}, {2026, 1, 1}), (CivilDate{2026, 11, 22}));
-  EXPECT_EQ(resolve_rollover({2020, 6, 1}, {2026, 1, 1}), (CivilDate{2020, 6, 1})) << "nearest, not newest";
-  EXPECT_EQ(resolve_rollover({2045, 1, 1}, {2026, 1, 1}), (CivilDate{2025, 5, 18})) << "a date ahead of its time, too";
+  EXPECT_EQ(resolve_rollover({2007, 4, 11}, {2026, 11, 22}), (CivilDate{2007, 4, 11})) << "never three days ahead";
+  EXPECT_EQ(resolve_rollover({2014, 5, 26}, {2026, 11, 22}), (CivilDate{2014, 5, 26})) << "not into the future";
+  EXPECT_EQ(resolve_rollover({2026, 11, 22}, {2000, 1, 1}), (CivilDate{2026, 11, 22})) << "not into the past";
+  EXPECT_EQ(resolve_rollover({2045, 1, 1}, {2026, 1, 1}), (CivilDate{2045, 1, 1}));
+  EXPECT_FALSE(library_date() == CivilDate{});
+  EXPECT_GE(gps_day(library_date()), gps_day({2026, 11, 22}));
   for (const std::int64_t day : {0, 1, 5000, 100'000}) {
     for (const std::int64_t reference : {0, 3000, 50'000, 102'000}) {
       EXPECT_TRUE(is_date(resolve_rollover(date_from_gps_day(day), date_from_gps_day(reference))));

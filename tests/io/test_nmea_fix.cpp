@@ -255,6 +255,24 @@ TEST(NmeaFix, EpochsOverMidnightAndTheYearsEnd) {
   EXPECT_EQ(carried.fixes[3].gps_time_ns, *gps_from_utc({{2024, 2, 28}, 23, 59, 59, 500'000'000})) << "back again";
 }
 
+TEST(NmeaFix, ADateThatChangesAfterMidnightIsMended) {
+  Assembly a;
+  a.add(rmc("235959.00", "010126")).add(rmc("000000.00", "010126")).add(rmc("000001.00", "010126"));
+  a.add(rmc("000002.00", "020126")).finish();
+  ASSERT_EQ(a.fixes.size(), 4U);
+  const TimeNs midnight = *gps_from_utc({.date = {2026, 1, 2}});
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(a.fixes[static_cast<std::size_t>(i)].gps_time_ns, midnight + (i - 1) * kSecond);
+  EXPECT_EQ(a.count("gps.date_late"), 2);
+  // A wrong date that is set right by a day is none of this, nor is a log that begins again.
+  Assembly set_right;
+  set_right.add(rmc("000030.00", "020126")).add(rmc("000031.00", "010126")).finish();
+  EXPECT_EQ(set_right.fixes[1].gps_time_ns, midnight - 86'400 * kSecond + 31 * kSecond);
+  Assembly again;
+  again.add(rmc("235900.00", "010126")).add(rmc("000000.00", "010126")).finish();
+  EXPECT_EQ(again.fixes[1].gps_time_ns, midnight - 86'400 * kSecond);
+  EXPECT_EQ(again.count("gps.date_late") + set_right.count("gps.date_late"), 0);
+}
+
 TEST(NmeaFix, TheLeapSecondIsASecondOfItsOwn) {
   Assembly a;
   for (const char* t : {"235959.00", "235960.00", "235960.50"}) a.add(rmc(t, "311216"));
@@ -303,6 +321,18 @@ TEST(NmeaFix, DatesOfAgedReceiversNeedAReference) {
   EXPECT_EQ(a.only().gps_time_ns, *gps_from_utc({{2026, 11, 24}, 12, 0, 0, 0}));
   EXPECT_EQ(a.count("gps.rollover_mended"), 1);
   EXPECT_EQ(a.count("gps.date_past_leap_table"), 1);
+  // What was changed or assumed is said once.
+  std::vector<std::string> remarks;
+  NmeaFixOptions telling = today;
+  telling.on_remark = [&](const std::string& text) { remarks.push_back(text); };
+  Assembly(telling).add(rmc("120000", "100407")).add(rmc("120001", "100407")).add(rmc("120002", "100407")).finish();
+  ASSERT_EQ(remarks.size(), 2U);
+  EXPECT_NE(remarks[0].find("tells 2007-04-10, which is taken for 2026-11-24"), std::string::npos) << remarks[0];
+  EXPECT_NE(remarks[1].find("known until 2026-06-28: GPS - UTC = 18 s"), std::string::npos) << remarks[1];
+  remarks.clear();
+  EXPECT_EQ(Assembly(telling).add(rmc("120000", "260514")).only().gps_time_ns,
+            *gps_from_utc({{2014, 5, 26}, 12, 0, 0, 0}));
+  EXPECT_EQ(remarks.size(), 0U);
   Assembly untouched;
   EXPECT_EQ(untouched.add(rmc("120000", "100407")).only().gps_time_ns, *gps_from_utc({{2007, 4, 10}, 12, 0, 0, 0}));
   EXPECT_EQ(Assembly(today).add(rmc("120000", "221126")).only().gps_time_ns,

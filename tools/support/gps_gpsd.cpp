@@ -242,7 +242,9 @@ class GpsdSource final : public MeasurementSource {
     const bool differs = told > 0 && told <= 255 && told != table.gps_minus_utc(date);
     if (differs) ++leap_differ_;
     if (table.known_on(date)) return gps;
-    ++past_leap_table_;
+    if (past_leap_table_++ == 0 && !differs && options_.fix.on_remark) {
+      options_.fix.on_remark(past_leap_table_remark(date, table));
+    }
     return differs ? gps_from_unix(unix_ns, LeapSeconds::constant(told)) : gps;
   }
 

@@ -1,5 +1,7 @@
 #include "tools/support/gps_options.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <fstream>
 #include <sstream>
 #include <tuple>
@@ -57,6 +59,7 @@ LeapSeconds newest_table() {
 
 void add_fix_options(CLI::App& source, NmeaFixOptions& fix) {
   fix.leap_seconds = newest_table();
+  fix.on_remark = [](const std::string& text) { spdlog::warn("event=gps_date reason=\"{}\"", text); };
   CLI::Option* constant = source.add_option_function<int>(
       "--leap-seconds", [&fix](int seconds) { fix.leap_seconds = LeapSeconds::constant(seconds); },
       "GPS time minus UTC [s], instead of the table (the program's or the system's, whichever is newer)");
@@ -73,8 +76,8 @@ void add_fix_options(CLI::App& source, NmeaFixOptions& fix) {
 void add_nmea_options(CLI::App& source, NmeaFixOptions& fix) {
   source.add_option_function<std::string>(
       "--reference-date", [&fix](const std::string& text) { set_date(text, fix); },
-      "A day within 10 years of the data, YYYY-MM-DD: resolves two-digit years and mends the dates of receivers that "
-      "are past their 1024 weeks");
+      "A day at or after that of the data, by less than 19 years, YYYY-MM-DD: resolves two-digit years and mends the "
+      "dates of receivers that are past their 1024 weeks (live: the host's date)");
   source.add_option("--geoid-separation", fix.geoid_separation,
                     "Geoid above the ellipsoid where the receiver does not say it [m]");
   source

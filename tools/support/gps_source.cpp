@@ -189,9 +189,11 @@ namespace {
 
 LiveGpsOptions with_date_of_host(LiveGpsOptions options) {
   if (options.fix.reference_date) return options;
-  // The host's clock may be wrong by years and still serve.
+  // Boards without a battery begin in 1970 or when their system was made.
+  options.fix.reference_date = library_date();
   if (const auto gps = gps_from_unix(host_now(), options.fix.leap_seconds)) {
-    options.fix.reference_date = utc_from_gps(*gps, options.fix.leap_seconds).date;
+    const CivilDate host = utc_from_gps(*gps, options.fix.leap_seconds).date;
+    if (gps_day(host) > gps_day(library_date())) options.fix.reference_date = host;
   }
   return options;
 }

@@ -15,7 +15,7 @@
 namespace loc {
 
 struct LiveGpsOptions {
-  /// reference_date is set to the host's date when it has none.
+  /// reference_date is set to the host's date (or library_date(), if later) when it has none.
   NmeaFixOptions fix;
   double silence_s = 5;               ///< without a byte, or with bytes and no sentence, after which it is told
   double reconnect_s = 1;             ///< between two attempts
