@@ -3,8 +3,9 @@
 //
 //   corrected = W (x - C),   |corrected| = reference norm of the field
 //
-// W is symmetric: a rotation of the corrected readings is not observable from their norm (calib/mag_alignment finds it
-// with the help of the IMU). An accelerometer gives such readings only while it does not move (calib/stillness).
+// W is symmetric: a rotation of the corrected readings is not observable from their norm (calib/magnetometer_alignment
+// finds it with the help of the IMU). An accelerometer gives such readings only while it does not move
+// (calib/stillness).
 //
 // Methods and their sources:
 //   lsq     the nine-parameter form a1 x^2 + a2 y^2 + a3 z^2 + a4 xy + a5 xz + a6 yz + a7 x + a8 y + a9 z = 1 by least
