@@ -18,6 +18,15 @@ constexpr int kVotesToBegin = 3;
 constexpr int kVotesToChange = 10;
 constexpr int kDoubt = 3;  // labels or pulses in a row that disagree: no answer until it is clear
 constexpr std::int64_t kLargestSecond = 9'000'000'000;  // in int64 nanoseconds
+// Labels from whose lateness the pairing is judged, and how far from the cut they must be: in deviations of one, and of
+// the mean.
+constexpr std::size_t kPhasesToPair = 8;
+constexpr double kSigmasToPair = 3;
+constexpr double kSigmasToStay = 2.5;
+constexpr double kSigmasOfMean = 5;
+constexpr double kLatestS = 0.5;     // against the expected delay: beyond, it is the next pulse's
+constexpr double kEarliestS = -0.4;  // mean; before, labels may be late by nearly a second just as well
+constexpr double kLeastSpreadS = 1e-3;
 // A label is never in error by less than a second, and by tenths it is only late.
 constexpr TimeNs kLabelStep = 400'000'000;
 
@@ -103,13 +112,14 @@ void GpsClock::update(const GpsTimeEvent& event) {
     ++counts_.invalid;
     return;
   }
+  labelled_ = paired_ = true;
   vote(seconds_of(gps) - *index);
 }
 
 // Another line, not the first one, and one that answers are made of: the host's clock was set.
 void GpsClock::count_epochs() {
   const bool pulses = pulse_epoch_ > 0 && pulse_model_.epoch() != pulse_epoch_;
-  const bool labels = label_epoch_ > 0 && label_model_.epoch() != label_epoch_ && !second_;
+  const bool labels = label_epoch_ > 0 && label_model_.epoch() != label_epoch_ && !(second_ && paired_);
   if (pulses || labels) ++epoch_;
   pulse_epoch_ = pulse_model_.epoch();
   label_epoch_ = label_model_.epoch();
@@ -164,6 +174,7 @@ std::optional<std::int64_t> GpsClock::look_for_train(TimeNs host_ns) {
   pulse_model_.reset();
   second_.reset();
   vote_count_ = 0;
+  forget_pairing();
   disagreeing_in_a_row_ = 0;
   rejected_in_a_row_ = 0;
   candidate_count_ = 0;
@@ -184,11 +195,37 @@ void GpsClock::take_label(TimeNs gps_ns, TimeNs host_ns) {
     locked_ = false;
     second_.reset();
     vote_count_ = 0;
+    forget_pairing();
     return;
   }
   const TimeNs since = pulse_model_.line().inverse().convert(host_ns);
   const TimeNs early = saturating_sum(saturating_difference(gps_ns, since), options_.pairing_delay_ns);
+  judge_pairing(saturating_difference(seconds_of(early) * kSecond, early));
   vote(seconds_of(early) - (options_.label == PulseLabel::kNext ? 1 : 0));
+}
+
+// @param off_ns how much later than expected the label came, modulo 1 s
+void GpsClock::judge_pairing(TimeNs off_ns) {
+  if (labelled_) return;
+  phases_[phase_count_++ % kPhases] = to_seconds(off_ns);
+  const std::size_t count = std::min(phase_count_, kPhases);
+  const auto n = static_cast<double>(count);
+  double mean = 0;
+  for (std::size_t i = 0; i < count; ++i) mean += phases_[i] / n;
+  double sum = 0;
+  for (std::size_t i = 0; i < count; ++i) sum += (phases_[i] - mean) * (phases_[i] - mean);
+  const double spread = std::max(kLeastSpreadS, std::sqrt(sum / std::max(1.0, n - 1)));
+  const double reach = spread * (paired_ ? kSigmasToStay : kSigmasToPair);
+  const double reach_of_mean = kSigmasOfMean * spread / std::sqrt(n);
+  // Jitter makes late, not early: what reaches across the early end are single labels, which are outvoted.
+  paired_ = count >= kPhasesToPair && mean + reach < kLatestS && mean - reach / 2 > -kLatestS &&
+            mean - reach_of_mean > kEarliestS;
+  if (!paired_ && count >= kPhasesToPair) ++counts_.labels_ambiguous;
+}
+
+void GpsClock::forget_pairing() {
+  phase_count_ = 0;
+  labelled_ = paired_ = false;
 }
 
 // A time that is whole multiples of 1024 weeks off comes from a receiver that counts weeks with ten bits.
@@ -231,13 +268,13 @@ void GpsClock::vote(std::int64_t second) {
 }
 
 bool GpsClock::pulses_answer() const {
-  return locked_ && second_ && disagreeing_in_a_row_ < kDoubt && rejected_in_a_row_ < kDoubt;
+  return locked_ && second_ && paired_ && disagreeing_in_a_row_ < kDoubt && rejected_in_a_row_ < kDoubt;
 }
 
 GpsClockBasis GpsClock::basis() const {
   if (pulses_answer()) return GpsClockBasis::kPulses;
   // Labels that disagree with pulses are no better alone; nor are they after the host's clock was set.
-  if (second_ || (locked_ && counts_.pulse_locks > 1)) return GpsClockBasis::kNone;
+  if ((second_ && paired_) || (locked_ && counts_.pulse_locks > 1)) return GpsClockBasis::kNone;
   if (!label_model_.ready() || label_model_.doubtful()) return GpsClockBasis::kNone;
   return GpsClockBasis::kLabels;
 }

@@ -1,7 +1,7 @@
 // Host clock -> GPS time, from pulses and labels (sensors/gps_time_event.hpp). A pulse says exactly when a second
 // begins, a label says which second it is: the integer second is the one that most labels agree on, against the line
 // through the pulses. Without pulses the labels alone give the time, late by what the receiver and the line take: 10 to
-// 700 ms that nothing here can observe. sigma says so.
+// 700 ms that nothing here can observe: by default 350 ms are taken off, and sigma is 200 ms.
 //
 // Wrong pulses (not at a whole second from the others, within the gate) and wrong labels (midnight, leap seconds that
 // the receiver learns late, week rollover) are rejected while they are few. When labels go on to disagree, nothing is
@@ -25,11 +25,14 @@ struct GpsClockOptions {
   TimeNs pulse_gate_ns = 100'000'000;  ///< A pulse farther from a whole second than this is none.
   TimeNs pulse_delay_ns = 0;           ///< Delay from the edge to its stamp, at best;
   TimeNs sigma_pulse_delay_ns = 2000;  ///< how well that is known: nothing here can observe it. Interrupts take 2 us.
-  /// Labels that come this long after their pulse, or up to 0.5 s earlier or later, are paired rightly.
+  /// Labels that come this long after their pulse, or up to 0.4 s earlier or 0.5 s later, are paired rightly. Where
+  /// they come is seen only within a second: 0.95 s late looks as 0.05 s early. While their mean and spread leave open
+  /// which pulse they belong to, labels alone give the time (GpsClockCounts::labels_ambiguous).
   TimeNs pairing_delay_ns = 400'000'000;
-  /// Without pulses: how late labels are at best, and how well that is known. Receivers have 10 to 700 ms.
-  TimeNs label_delay_ns = 100'000'000;
-  TimeNs sigma_label_delay_ns = 100'000'000;
+  /// Without pulses: how late labels are at best, and how well that is known. Receivers have 10 to 700 ms, each its
+  /// own: the middle of that, and the deviation of a uniform distribution.
+  TimeNs label_delay_ns = 350'000'000;
+  TimeNs sigma_label_delay_ns = 200'000'000;
   double max_pulse_extrapolation_s = 600;  ///< So long after the last pulse it still answers, sigma growing.
   double max_label_extrapolation_s = 60;   ///< Likewise after the last label, without pulses.
 
@@ -45,6 +48,7 @@ struct GpsClockCounts {
   std::int64_t pulse_locks = 0;         ///< times that a train of pulses was found: 1, more after host steps
   std::int64_t labels = 0;              ///< offered
   std::int64_t labels_disagreeing = 0;  ///< named another second than the one in use
+  std::int64_t labels_ambiguous = 0;    ///< came while it was not clear which pulse labels belong to
   std::int64_t label_jumps = 0;     ///< the labels' second changed for good and was followed (leap second, wrong date)
   std::int64_t week_rollovers = 0;  ///< labels that were a multiple of 1024 weeks off, and were mended
   std::int64_t invalid = 0;         ///< without a time
@@ -52,7 +56,7 @@ struct GpsClockCounts {
 
 enum class GpsClockBasis : std::uint8_t {
   kNone,    ///< no answer yet, or none any more
-  kLabels,  ///< labels only: tens of milliseconds
+  kLabels,  ///< labels only: tenths of a second, unless their delay is known
   kPulses   ///< pulses and labels: microseconds
 };
 /// "none", "labels", "pulses"
@@ -84,12 +88,15 @@ class GpsClock {
  private:
   static constexpr std::size_t kCandidates = 8;
   static constexpr std::size_t kVotes = 15;
+  static constexpr std::size_t kPhases = 60;
 
   std::optional<std::int64_t> take_pulse(TimeNs host_ns);
   std::optional<std::int64_t> look_for_train(TimeNs host_ns);
   void take_label(TimeNs gps_ns, TimeNs host_ns);
   TimeNs mend_rollover(TimeNs gps_ns, TimeNs host_ns);
   void vote(std::int64_t second);
+  void judge_pairing(TimeNs off_ns);
+  void forget_pairing();
   void count_epochs();
   bool pulses_answer() const;
 
@@ -106,6 +113,11 @@ class GpsClock {
   std::array<std::int64_t, kVotes> votes_{};
   std::size_t vote_count_ = 0;  // also of those that have been overwritten
   std::optional<std::int64_t> second_;
+  // How much later than expected the last labels came, modulo 1 s [s], and whether that says which pulse is theirs.
+  std::array<double, kPhases> phases_{};
+  std::size_t phase_count_ = 0;  // also of those that have been overwritten
+  bool paired_ = false;
+  bool labelled_ = false;  // pulses bring their labels with them
   int disagreeing_in_a_row_ = 0;
   std::int64_t epoch_ = 0;
   std::int64_t pulse_epoch_ = 0;  // of the models, as counted in epoch_

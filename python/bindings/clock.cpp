@@ -160,6 +160,7 @@ py::dict counts_dict(const GpsClockCounts& c) {
   d["pulse_locks"] = c.pulse_locks;
   d["labels"] = c.labels;
   d["labels_disagreeing"] = c.labels_disagreeing;
+  d["labels_ambiguous"] = c.labels_ambiguous;
   d["label_jumps"] = c.label_jumps;
   d["week_rollovers"] = c.week_rollovers;
   d["invalid"] = c.invalid;
@@ -316,8 +317,8 @@ void bind_gps(py::module_& m) {
       "sigma says tens of milliseconds.")
       .def(py::init([](const py::kwargs& kwargs) { return GpsClock(gps_options(kwargs)); }),
            "Options as keywords: label='previous' or 'next', pulse_gate_ns=100_000_000, pulse_delay_ns=0, "
-           "sigma_pulse_delay_ns=2000, pairing_delay_ns=400_000_000, label_delay_ns=100_000_000, "
-           "sigma_label_delay_ns=100_000_000, max_pulse_extrapolation_s=600, max_label_extrapolation_s=60.")
+           "sigma_pulse_delay_ns=2000, pairing_delay_ns=400_000_000, label_delay_ns=350_000_000, "
+           "sigma_label_delay_ns=200_000_000, max_pulse_extrapolation_s=600, max_label_extrapolation_s=60.")
       .def("update", &take_events<GpsClock>, py::arg("is_pulse"), py::arg("host_times_ns"), py::arg("gps_times_ns"),
            kEventsDoc)
       .def(

@@ -1701,7 +1701,7 @@ class GpsClock:
     """
     def __init__(self, **kwargs) -> None:
         """
-        Options as keywords: label='previous' or 'next', pulse_gate_ns=100_000_000, pulse_delay_ns=0, sigma_pulse_delay_ns=2000, pairing_delay_ns=400_000_000, label_delay_ns=100_000_000, sigma_label_delay_ns=100_000_000, max_pulse_extrapolation_s=600, max_label_extrapolation_s=60.
+        Options as keywords: label='previous' or 'next', pulse_gate_ns=100_000_000, pulse_delay_ns=0, sigma_pulse_delay_ns=2000, pairing_delay_ns=400_000_000, label_delay_ns=350_000_000, sigma_label_delay_ns=200_000_000, max_pulse_extrapolation_s=600, max_label_extrapolation_s=60.
         """
     def convert(self, host_times_ns: numpy.typing.NDArray[numpy.int64]) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
         """
