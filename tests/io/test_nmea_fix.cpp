@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <numbers>
 
@@ -430,6 +431,57 @@ TEST_F(NmeaLog, TimesIncreaseAndEveryEpochIsAccountedFor) {
   EXPECT_EQ(count_of(counts_, "gps.skipped.time_not_increasing"), 1);
   EXPECT_EQ(count_of(counts_, "gps.epochs"), 8);
   EXPECT_EQ(count_of(counts_, "nmea.malformed.cut"), 1);
+}
+
+TEST_F(NmeaLog, WrongDatesDoNotTakeTheGoodOnesAlong) {
+  const auto good = [](int from, int to) {
+    std::string text;
+    for (int s = from; s < to; ++s) {
+      char time[16];
+      std::snprintf(time, sizeof time, "12%02d%02d", s / 60, s % 60);
+      text += sentence(rmc(time, "120419"));
+    }
+    return text;
+  };
+  const TimeNs begin = *gps_from_utc({{2019, 4, 12}, 12, 0, 0, 0});
+  const auto expect_good = [&](const std::string& text, std::int64_t skipped, const std::string& what) {
+    const std::vector<GpsMeasurement> fixes = read(write(text));
+    ASSERT_EQ(fixes.size(), 180U) << what;
+    for (std::size_t i = 0; i < fixes.size(); ++i) {
+      ASSERT_EQ(fixes[i].time_ns, begin + static_cast<TimeNs>(i) * kSecond) << what;
+      ASSERT_EQ(fixes[i].sequence, static_cast<std::int64_t>(i)) << what;
+    }
+    EXPECT_EQ(count_of(counts_, "gps.skipped.time_not_increasing"), skipped) << what;
+    EXPECT_EQ(count_of(counts_, "gps.epochs"), 180 + skipped) << what;
+  };
+  const std::string future = sentence(rmc("110000", "050127"));
+  const std::string later = sentence(rmc("110001", "050127"));
+  const std::string past = sentence(rmc("110000", "050101"));
+  expect_good(good(0, 180), 0, "all good");
+  expect_good(future + later + good(0, 180), 2, "two at the beginning");
+  for (const int at : {1, 10, 63, 64, 65, 100, 170, 178}) {
+    expect_good(good(0, at) + future + good(at, 180), 1, "one after " + std::to_string(at));
+    expect_good(good(0, at) + past + good(at, 180), 1, "the past after " + std::to_string(at));
+  }
+  expect_good(good(0, 90) + future + later + good(90, 120) + future + good(120, 180), 3, "more than once");
+
+  // Leaps that are true: one fix a day, and a log of two days.
+  std::string days;
+  for (int day = 10; day < 30; ++day) days += sentence(rmc("120000", std::to_string(day) + "0419"));
+  EXPECT_EQ(read(write(days)).size(), 20U);
+  EXPECT_EQ(read(write(good(0, 100) + sentence(rmc("120000", "140419")) + sentence(rmc("120001", "140419")))).size(),
+            102U);
+  // A log that steps back for good says so.
+  std::vector<std::string> remarks;
+  NmeaFixOptions options;
+  options.on_remark = [&](const std::string& text) { remarks.push_back(text); };
+  const auto source = open_nmea(write(good(100, 180) + good(0, 50)), options);
+  int given = 0;
+  while (source->next()) ++given;
+  EXPECT_EQ(given, 80);
+  EXPECT_EQ(count_of(source->counts(), "gps.skipped.time_not_increasing"), 50);
+  ASSERT_EQ(remarks.size(), 1U);
+  EXPECT_NE(remarks[0].find("steps back"), std::string::npos);
 }
 
 TEST_F(NmeaLog, WhatIsNoLogSaysSo) {
