@@ -22,7 +22,7 @@ constexpr std::int64_t kStampBytes = 3 * 8;
 // Only the lengths matter: one function for each type that has any, in the order of its .lcm file.
 void walk(wire::Walker& w, const clock_t&) {
   w.skip(8);
-  for (int i = 0; i < 3; ++i) w.string();
+  for (int i = 0; i < 4; ++i) w.string();
   w.skip(9 * 8 + 1);
 }
 void walk(wire::Walker& w, const estimate_t&) {

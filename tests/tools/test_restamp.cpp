@@ -323,6 +323,7 @@ void expect_gps_time_over_lcm(const std::string& url) {
     ++sent;
     sender_link.publish(message);
   };
+  sender_options.sender = "receiver";
   RestampedSource sender(std::make_unique<ListSource>(), sender_options);
 
   ClockLink link(url);
@@ -366,9 +367,14 @@ TEST(Restamp, gps_time_from_another_program_over_a_hub) {
 }
 
 TEST(Restamp, messages_that_are_wrong_or_from_a_third_program) {
-  RestampedSource source(std::make_unique<ListSource>(), options_for(TimeBase::kGps));
+  TimeNs now = 0;
+  RestampOptions options = options_for(TimeBase::kGps);
+  options.steady = [&] { return now; };
+  RestampedSource source(std::make_unique<ListSource>(), options);
   clock_t message = to_message(ClockLine{1000 * kSecond, 5 * kSecond, 0, 1000, 1e-9, 1e-8, 0, 2000 * kSecond});
   message.source = "a";
+  message.host = host_identity();
+  message.time_ns = 1;
   message.input_clock = "host";
   message.output_clock = "gps";
   message.quality = clock_t::QUALITY_PULSES;
@@ -381,6 +387,15 @@ TEST(Restamp, messages_that_are_wrong_or_from_a_third_program) {
   wrong.output_clock = "device";
   source.take(wrong);
   EXPECT_EQ(source.status()[0].basis, "none");
+  wrong = message;
+  wrong.host = "another computer";
+  source.take(wrong);
+  EXPECT_EQ(source.status()[0].basis, "none");
+  EXPECT_EQ(test::count(source.counts(), "clock.other_hosts"), 1);
+  wrong = message;
+  wrong.source = own_name();
+  source.take(wrong);
+  EXPECT_EQ(source.status()[0].basis, "none") << "what we have said ourselves";
   source.take(message);
   EXPECT_EQ(source.status()[0].basis, "other");
   clock_t third = message;
@@ -389,9 +404,40 @@ TEST(Restamp, messages_that_are_wrong_or_from_a_third_program) {
   source.take(third);
   EXPECT_EQ(test::count(source.counts(), "clock.other_sources"), 1);
   EXPECT_NEAR(source.status()[0].offset_s, -995, 1e-6);
-  third.input_ref_ns += 6 * kSecond;  // the first one has fallen silent
+  // The first one has nothing new to say; the host's clock was set back, and does not matter.
+  now = 3 * kSecond;
+  source.take(message);
+  now = 6 * kSecond;
+  third.input_ref_ns -= 400 * kSecond;
+  third.output_ref_ns -= 400 * kSecond;
   source.take(third);
-  EXPECT_NEAR(source.status()[0].offset_s, -1000, 1e-6);
+  EXPECT_NEAR(source.status()[0].offset_s, -994, 1e-6);
+  EXPECT_EQ(test::count(source.counts(), "clock.other_sources"), 1);
+}
+
+TEST(Restamp, a_fix_with_a_wrong_date_does_not_leave) {
+  WithGps w = with_gps(false, 60);
+  for (const TimeBase base : {TimeBase::kGps, TimeBase::kHost}) {
+    auto list = std::make_unique<ListSource>();
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < w.gps.events.size(); ++i) {
+      GpsMeasurement fix;
+      fix.time_ns = fix.host_time_ns = w.gps.events[i].host_time_ns;
+      fix.gps_time_ns = w.gps.events[i].gps_time_ns;
+      if (i == 20 || i == 40) fix.gps_time_ns += (i == 20 ? -1 : 1) * 86'400 * kSecond;
+      wrong += i == 20 || i == 40 ? 1 : 0;
+      list->list.emplace_back(fix);
+    }
+    ASSERT_EQ(wrong, 2U);
+    const std::size_t all = list->list.size();
+    RestampedSource source(std::move(list), options_for(base));
+    const auto out = test::only<GpsMeasurement>(test::read_all(source));
+    EXPECT_EQ(out.size(), all - 2);
+    EXPECT_EQ(test::count(source.counts(), "gps.time_disagrees"), 2);
+    for (std::size_t i = 1; i < out.size(); ++i) {
+      EXPECT_LT(std::abs(to_seconds(out[i].time_ns - out[i - 1].time_ns)), 3) << i;
+    }
+  }
 }
 
 TEST(Restamp, options_are_checked) {

@@ -4,7 +4,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <fstream>
 
 #include "libloc/core/check.hpp"
 #include "msgs/convert.hpp"
@@ -28,6 +30,19 @@ TimeBase parse_time_base(const std::string& text) {
   if (text == "host") return TimeBase::kHost;
   if (text == "gps") return TimeBase::kGps;
   throw UsageError("--time-base '" + text + "': must be device, host or gps");
+}
+
+std::string host_identity() {
+  std::string id;
+  std::getline(std::ifstream("/proc/sys/kernel/random/boot_id"), id);
+  if (!id.empty()) return id;
+  std::array<char, 256> name{};
+  ::gethostname(name.data(), name.size() - 1);
+  return name.data();
+}
+
+std::string own_name() {
+  return "loc-driver " + std::to_string(::getpid());
 }
 
 void RestampOptions::check() const {
@@ -60,8 +75,8 @@ std::optional<Measurement> RestampedSource::next() {
       }
       Measurement measurement = std::move(first.measurement);
       waiting_.pop_front();
-      if (outcome == Outcome::kNever) {
-        ++absurd_;
+      if (outcome == Outcome::kNever || outcome == Outcome::kDisagrees) {
+        ++(outcome == Outcome::kNever ? absurd_ : time_disagrees_);
         continue;
       }
       ++stamped_;
@@ -70,12 +85,21 @@ std::optional<Measurement> RestampedSource::next() {
     if (ended_) {
       dropped_ += static_cast<std::int64_t>(waiting_.size());
       waiting_.clear();
+      const std::int64_t refused = bad_messages_ + other_sources_ + other_hosts_;
+      if (refused > 0 && !std::exchange(told_refusal_, true)) {
+        spdlog::warn("event=clock_messages_refused wrong={} of_other_hosts={} of_second_program={} last=\"{}\"",
+                     bad_messages_, other_hosts_, other_sources_, last_refusal_);
+      }
       if (stamped_ == 0 && dropped_ > 0 && !stopped_) {
-        throw DataError("--time-base " + std::string(options_.base == TimeBase::kGps ? "gps" : "host") + ": none of " +
-                        std::to_string(dropped_) + " measurements could be stamped, because " +
-                        (options_.base == TimeBase::kGps
-                             ? "no GPS time became known (no fix with a time, no pulse and label, nothing on LOC_CLOCK)"
-                             : "their clock did not become known"));
+        throw DataError(
+            "--time-base " + std::string(options_.base == TimeBase::kGps ? "gps" : "host") + ": none of " +
+            std::to_string(dropped_) + " measurements could be stamped, because " +
+            (options_.base == TimeBase::kGps
+                 ? "no GPS time became known (no fix with a time, no pulse and label, nothing on LOC_CLOCK" +
+                       (refused > 0
+                            ? " but " + std::to_string(refused) + " refused messages, the last: " + last_refusal_ + ")"
+                            : std::string(")"))
+                 : std::string("their clock did not become known")));
       }
       return std::nullopt;
     }
@@ -148,12 +172,15 @@ RestampedSource::Outcome RestampedSource::stamp(Waiting& waiting) {
   if (fix != nullptr && fix->gps_time_ns != kNoTime) {
     if (options_.base == TimeBase::kGps) {
       // Its own time of validity, once the other streams have one on the same clock.
-      if (!host_to_gps(fix->host_time_ns)) return Outcome::kWait;
+      const auto line = host_to_gps(fix->host_time_ns);
+      if (!line) return Outcome::kWait;
+      if (disagrees(*fix, *line)) return Outcome::kDisagrees;
       s.time_ns = monotone(stream, fix->gps_time_ns, fix->gps_time_ns);
       return Outcome::kStamped;
     }
     const auto line = gps_.line();
     if (!line) return Outcome::kWait;
+    if (disagrees(*fix, *line)) return Outcome::kDisagrees;
     s.time_ns = monotone(stream, fix->gps_time_ns, line->inverse().convert(fix->gps_time_ns));
     return Outcome::kStamped;
   }
@@ -179,6 +206,12 @@ RestampedSource::Outcome RestampedSource::stamp(Waiting& waiting) {
   }
   s.time_ns = monotone(stream, s.time_ns, time_ns);
   return Outcome::kStamped;
+}
+
+bool RestampedSource::disagrees(const GpsMeasurement& fix, const ClockLine& line) {
+  const TimeNs difference = saturating_difference(line.convert(fix.host_time_ns), fix.gps_time_ns);
+  const double limit = static_cast<double>(kSecond) + 6 * line.sigma_at_ns(fix.host_time_ns);
+  return std::abs(static_cast<double>(difference)) > limit;
 }
 
 TimeNs RestampedSource::monotone(Stream& stream, TimeNs device_ns, TimeNs time_ns) {
@@ -234,7 +267,8 @@ void RestampedSource::follow(const GpsTimeEvent& event) {
   next_send_ns_ = saturating_sum(event.host_time_ns, kSecond * 9 / 10);
   clock_t message = to_message(*line);
   message.time_ns = host_now();
-  message.source = "loc-driver " + std::to_string(::getpid());
+  message.source = options_.sender;
+  message.host = options_.host;
   message.input_clock = "host";
   message.output_clock = "gps";
   message.epoch = gps_.epoch();
@@ -244,17 +278,23 @@ void RestampedSource::follow(const GpsTimeEvent& event) {
 
 void RestampedSource::take(const clock_t& message) {
   if (message.input_clock != "host" || message.output_clock != "gps") return;
+  if (message.host != options_.host) {
+    refuse(other_hosts_, "it is about the clock of another host (" + message.source + " on " + message.host + ")");
+    return;
+  }
+  if (message.source == options_.sender) return;
   ClockLine line;
   try {
     line = from_message(message);
   } catch (const DataError& error) {
-    if (bad_messages_++ == 0) spdlog::warn("event=bad_clock_message {}", error.what());
+    refuse(bad_messages_, error.what());
     return;
   }
   // One program at a time: two receivers differ by microseconds, and to and fro between them is no time.
-  const bool silent = other_ && saturating_difference(line.input_ref_ns, other_->input_ref_ns) > kForgetOther;
+  const TimeNs now = steady();
+  const bool silent = other_ && now - other_heard_ns_ > kForgetOther;
   if (other_ && other_source_ != message.source && !silent) {
-    ++other_sources_;
+    refuse(other_sources_, message.source + " speaks while " + other_source_ + " is followed");
     return;
   }
   if (!other_ || other_source_ != message.source || other_epoch_ != message.epoch) {
@@ -264,8 +304,20 @@ void RestampedSource::take(const clock_t& message) {
   if (!other_ || other_source_ != message.source) other_since_ns_ = newest_arrival_ns_;
   other_ = line;
   other_labels_ = message.quality == clock_t::QUALITY_LABELS;
+  // The same message once more is no news.
+  if (other_source_ != message.source || other_sent_ns_ != message.time_ns) other_heard_ns_ = now;
+  other_sent_ns_ = message.time_ns;
   other_source_ = message.source;
   other_epoch_ = message.epoch;
+}
+
+void RestampedSource::refuse(std::int64_t& count, const std::string& why) {
+  if (count++ == 0) spdlog::warn("event=clock_message_refused reason=\"{}\"", why);
+  last_refusal_ = why;
+}
+
+TimeNs RestampedSource::steady() const {
+  return options_.steady ? options_.steady() : steady_now();
 }
 
 std::vector<ClockStatus> RestampedSource::status() const {
@@ -327,6 +379,7 @@ NamedCounts RestampedSource::counts() const {
   out.push_back({"clock.host_steps_back", sum.host_steps_back});
   out.push_back({"clock.gaps", sum.gaps});
   out.push_back({"clock.steps", steps});
+  out.push_back({"gps.time_disagrees", time_disagrees_});
   if (options_.base == TimeBase::kGps || gps_since_ns_ != kNoTime) {
     const GpsClockCounts& c = gps_.counts();
     out.push_back({"clock.pulses_used", c.pulses_used});
@@ -336,6 +389,7 @@ NamedCounts RestampedSource::counts() const {
     out.push_back({"clock.label_jumps", c.label_jumps});
     out.push_back({"clock.bad_messages", bad_messages_});
     out.push_back({"clock.other_sources", other_sources_});
+    out.push_back({"clock.other_hosts", other_hosts_});
   }
   return out;
 }

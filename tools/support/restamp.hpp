@@ -9,6 +9,8 @@
 // known. What has waited for longer than wait_s (of arrival time), or more of them than max_waiting, is dropped and
 // counted. In host time the wait is warm_up_s at the beginning. In GPS time, labels (tens of milliseconds) are believed
 // after pulse_wait_s without pulses; pulses that come later make the same time better, without a step back.
+// A fix whose own time is farther than 1 s and six sigma from what the line from host to GPS makes of its arrival is
+// dropped and counted (gps.time_disagrees): one wrong date must not leave amid the stream.
 // host_time_ns stays as it was. Times of a stream never step back, unless a clock was set or GPS labels were wrong:
 // counted (clock.steps), and told.
 #pragma once
@@ -34,6 +36,11 @@ enum class TimeBase { kDevice, kHost, kGps };
 /// @throws UsageError for anything but "device", "host", "gps".
 TimeBase parse_time_base(const std::string& text);
 
+/// Which running system's clock this is: its boot id, or its name where there is none. Containers share both.
+std::string host_identity();
+/// "loc-driver" with the process id
+std::string own_name();
+
 struct RestampOptions {
   TimeBase base = TimeBase::kHost;
   double warm_up_s = 1;              ///< So much of a stream is heard before its first sample leaves.
@@ -42,8 +49,11 @@ struct RestampOptions {
   std::size_t max_waiting = 20'000;  ///< Samples; 30 s of three streams at 200 Hz.
   ClockModelOptions clock;
   GpsClockOptions gps;
-  std::function<void()> poll;         ///< Called with every sample: hands over what other programs say, see take().
-  std::function<void(clock_t)> send;  ///< Called about once a second with host -> GPS of our own receiver.
+  std::function<void()> poll;          ///< Called with every sample: hands over what other programs say, see take().
+  std::function<void(clock_t)> send;   ///< Called about once a second with host -> GPS of our own receiver.
+  std::string host = host_identity();  ///< Lines of other hosts' clocks are refused.
+  std::string sender = own_name();     ///< Sender of our own lines; what comes back from it is not another's.
+  std::function<TimeNs()> steady;      ///< Monotonic time, by which others fall silent; empty: steady_now()
 
   /// @throws std::invalid_argument naming the field and its value.
   void check() const;
@@ -74,7 +84,9 @@ class RestampedSource : public MeasurementSource {
 
   /// Pulses and labels of a receiver in this program. From the thread that calls next().
   void take(const GpsTimeEvent& event);
-  /// What another program knows. Wrong or outdated messages are counted and left aside. From the same thread.
+  /// What another program on this host knows; our own messages are left aside, wrong ones, those of other hosts, and
+  /// those of a second program are counted. A program is silent when it has sent nothing new for 5 s by the monotonic
+  /// clock; then another may take its place. From the same thread.
   void take(const clock_t& message);
   std::vector<ClockStatus> status() const;
 
@@ -95,10 +107,13 @@ class RestampedSource : public MeasurementSource {
     std::int64_t epoch = 0;          // of the stream's model when it came
     std::optional<ClockStamp> host;  // as the model had it then
   };
-  enum class Outcome { kStamped, kWait, kNever };
+  enum class Outcome { kStamped, kWait, kNever, kDisagrees };
 
   std::optional<Measurement> as_it_is();
   void accept(Measurement measurement);
+  static bool disagrees(const GpsMeasurement& fix, const ClockLine& line);
+  void refuse(std::int64_t& count, const std::string& why);
+  TimeNs steady() const;
   void listen(const GpsMeasurement& fix);
   Outcome stamp(Waiting& waiting);
   std::optional<ClockLine> host_to_gps(TimeNs host_ns) const;
@@ -120,6 +135,8 @@ class RestampedSource : public MeasurementSource {
   std::string other_source_;
   std::int64_t other_epoch_ = 0;
   TimeNs other_since_ns_ = kNoTime;
+  TimeNs other_heard_ns_ = kNoTime;  // monotonic: the last news
+  TimeNs other_sent_ns_ = kNoTime;   // as it says itself
   bool other_labels_ = false;
   TimeNs newest_arrival_ns_ = kNoTime;
   TimeNs next_report_ns_ = kNoTime;
@@ -129,6 +146,10 @@ class RestampedSource : public MeasurementSource {
   std::int64_t absurd_ = 0;   // a device time that belongs to no clock
   std::int64_t bad_messages_ = 0;
   std::int64_t other_sources_ = 0;
+  std::int64_t other_hosts_ = 0;
+  std::int64_t time_disagrees_ = 0;  // fixes
+  std::string last_refusal_;         // of a message
+  bool told_refusal_ = false;
   std::atomic<bool> stopped_ = false;
   bool ended_ = false;
   bool told_waiting_ = false;
