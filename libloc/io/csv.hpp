@@ -15,7 +15,8 @@
 // time_ns,wx_rad_s,... is the same as #timestamp [ns],wx [rad s^-1],...: this is EuRoC's own form, too. The unit [arb]
 // of a magnetic field is what the sensor counts in; CsvOptions tells how many tesla that is. Columns come in any order
 // and number; a time and one complete triad are needed. The cells of one triad may all be empty (a magnetometer at its
-// own rate), never some of them. Comments: only the first line may begin with #.
+// own rate), never some of them. Comments: only the heading may begin with #.
+// Blank lines before it are passed over.
 #pragma once
 
 #include <cstdint>

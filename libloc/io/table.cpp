@@ -17,8 +17,15 @@ constexpr std::array<const char*, 3> kRowNames{"magnetometer", "reference", "imu
 
 Table::Table(const std::filesystem::path& path, const CsvOptions& options, std::string label)
     : lines_(path), label_(std::move(label)) {
-  const auto heading = lines_.next();
+  auto heading = lines_.next();
+  while (heading && trim(*heading).empty()) {
+    ++blank_;
+    heading = lines_.next();
+  }
   if (!heading) throw DataError(path.string() + ": the heading line has no end");
+  if (trim(*heading).starts_with('#') && heading->find(',') == std::string_view::npos) {
+    throw DataError(lines_.where() + ": a comment, not a heading: the first line must name the columns");
+  }
   columns_ = parse_heading(*heading, lines_.where(), options);
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     at_[static_cast<std::size_t>(columns_[i].quantity)][columns_[i].axis] = i;

@@ -138,7 +138,8 @@ TEST_F(Csv, bad_files_are_told) {
   expect_data_error([&] { open_csv(folder_.path()); }, {"folder"});
   expect_error("", {"empty"});
   expect_error(kHeading, {"no complete row"});
-  expect_error("\n" + kHeading + "1,1,2,3,4,5,6\n", {"a.csv:1"});
+  expect_error("\n \n", {"heading line has no end"});
+  expect_error("# my recording\n" + kHeading + "1,1,2,3,4,5,6\n", {"a.csv:1", "a comment, not a heading"});
   expect_error(kHeading + std::string(70000, '1') + "\n", {"a.csv:2", "longer"});
 }
 
@@ -233,6 +234,11 @@ TEST_F(Csv, byte_order_mark_carriage_returns_and_blank_lines) {
   ASSERT_EQ(all.size(), 2U);
   EXPECT_EQ(std::get<ReferenceMeasurement>(all[0]).position, Eigen::Vector3d(2, 3, 4));
   EXPECT_EQ(count(source->counts(), "rows.skipped.blank"), 1);
+
+  const auto below = open("\n \r\n" + kHeading + "1,1,2,3,4,5,6\n");
+  EXPECT_EQ(read_all(*below).size(), 1U);
+  EXPECT_EQ(count(below->counts(), "rows.skipped.blank"), 2);
+  expect_error("\n" + kHeading + "1,x,2,3,4,5,6\n", {"a.csv:3"});
 }
 
 TEST_F(Csv, cut_at_any_byte_gives_an_error_or_a_part_of_the_rows) {

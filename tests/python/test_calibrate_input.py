@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from libloc.programs.calibrate_input import InputOptions, merged, read_readings
+from libloc.programs.calibrate_input import InputOptions, merged, read_readings, read_stamps_table
 from support import data_folder, turning_body, write_csv
 
 from libloc import DataError
@@ -61,6 +61,27 @@ def test_units_and_times_in_the_heading(tmp_path):
     assert got.counts["rows.skipped.no_line_end"] == 1
 
 
+@pytest.mark.parametrize("before", ["\n", "\ufeff", "\ufeff\n \n", "\r\n"])
+def test_what_stands_before_the_heading(tmp_path, before):
+    path = tmp_path / "x.csv"
+    text = before + "mx [uT],my [uT],mz [uT]\n1,2,3\n2,3,4\n"
+    path.write_bytes(text.encode())
+    got = read(path)
+    assert np.allclose(got.magnetometer.rows, [[1e-6, 2e-6, 3e-6], [2e-6, 3e-6, 4e-6]])
+    path.write_bytes((before + "1,2,3\n2,3,4\n").encode())
+    got = read(path, columns="mx,my,mz", magnetometer_unit="uT")
+    assert len(got.magnetometer) == 2
+    path.write_bytes((before + "device_ns,host_ns\n1,2\n3,4\n").encode())
+    device, host, _ = read_stamps_table(path, InputOptions())
+    assert (device.tolist(), host.tolist()) == ([1, 3], [2, 4])
+
+
+def test_comments_before_the_heading_where_columns_are_named(tmp_path):
+    path = write(tmp_path / "x.csv", "# my recording\n# 3 axes\nX,Y,Z\n1,2,3\n")
+    got = read(path, columns="mx,my,mz", magnetometer_unit="uT")
+    assert got.magnetometer.rows.tolist() == [pytest.approx([1e-6, 2e-6, 3e-6])]
+
+
 def test_each_column_has_its_own_unit(tmp_path):
     path = write(tmp_path / "x.csv", "ax [g],ay [m/s^2],az [mg]\n1,2,3000\n")
     got = read(path, "accelerometer").accelerometer
@@ -98,7 +119,9 @@ def test_text_tables_of_imu_tk_are_merged():
 @pytest.mark.parametrize(
     ("text", "options", "message"),
     [
-        ("1,2,3\n", {}, r"x\.csv: the first line is numbers.*--columns mx,my,mz"),
+        ("# my recording\nmx_ut,my_ut,mz_ut\n1,2,3\n", {}, r"x\.csv:1: a comment, not a heading"),
+        ("\n# a, b\n1,2,3\n", {}, r"x\.csv:2: a comment, not a heading"),
+        ("1,2,3\n", {}, r"x\.csv:1: the first line is numbers.*--columns mx,my,mz"),
         ("1,2,3\n", {"columns": "mx,my"}, "2 of the 3 columns"),
         ("1,2,3\n", {"columns": "mx,my,mx"}, "comes twice"),
         ("1,2,3\n", {"columns": "mx,my,foo"}, "'foo' is not known"),

@@ -179,6 +179,16 @@ def _cells(line: str) -> list[str]:
     return [cell.strip() for cell in line.split(",")] if "," in line else line.split()
 
 
+def _first_line(path: Path, comments: bool) -> tuple[int, str]:
+    """Number and text of the first line that is not blank, nor a comment unless comments; (0, "") if none."""
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        for number, line in enumerate(file, start=1):
+            text = line.strip()
+            if text and (comments or not text.startswith("#")):
+                return number, text
+    return 0, ""
+
+
 def _is_number(text: str) -> bool:
     try:
         float(text)
@@ -198,8 +208,8 @@ def _parse_time(text: str, unit: str, where: str) -> int:
     return ns
 
 
-def _read_table(path: Path, columns: list[_Column], heading: bool, options: InputOptions) -> Readings:
-    """Rows of numbers, one column for each of columns."""
+def _read_table(path: Path, columns: list[_Column], heading: int, options: InputOptions) -> Readings:
+    """Rows of numbers, one column for each of columns. heading: number of its line, 0 for none."""
     out = Readings(str(path), "table")
     width = len(columns)
     time_at = next((i for i, c in enumerate(columns) if c.quantity == "time"), None)
@@ -222,10 +232,10 @@ def _read_table(path: Path, columns: list[_Column], heading: bool, options: Inpu
             places[triad] = at
     values: dict[str, list[list[float]]] = {triad: [] for triad in places}
     times: dict[str, list[int]] = {triad: [] for triad in places}
-    with path.open(encoding="utf-8", errors="replace", newline=None) as file:
+    with path.open(encoding="utf-8-sig", errors="replace", newline=None) as file:
         for number, line in enumerate(file, start=1):
             text = line.strip()
-            if (number == 1 and heading) or not text or text.startswith("#"):
+            if number == heading or not text or text.startswith("#"):
                 continue
             if not line.endswith("\n"):
                 # Cut while it was written: the last number may have lost digits.
@@ -301,33 +311,34 @@ def _open_csv(path: Path, options: InputOptions) -> libloc.MeasurementSource:
 
 
 def _read_text(path: Path, sensor: str, options: InputOptions) -> Readings:
-    with path.open(encoding="utf-8", errors="replace") as file:
-        first = ""
-        for line in file:
-            first = line.strip()
-            # A heading may be a comment line; what follows it is data.
-            if first:
-                break
+    # A heading may be a comment line; where --columns names them, comments say nothing.
+    at, first = _first_line(path, comments=options.columns is None)
     cells = _cells(first.lstrip("#").strip())
     numeric = bool(cells) and all(_is_number(cell) or not cell for cell in cells)
     if options.columns is not None:
         texts = options.columns.split(",")
         columns = _check_columns([_column(text) for text in texts], texts, "--columns")
-        return _read_table(path, columns, not numeric, options)
+        return _read_table(path, columns, 0 if numeric else at, options)
     if numeric:
         if path.suffix == ".mat" and len(cells) == 4:
             columns = [_Column("time", 0, "s"), *(_Column(sensor, axis, None) for axis in range(3))]
-            return _read_table(path, columns, False, options)
+            return _read_table(path, columns, 0, options)
         raise DataError(
-            f"{path}: the first line is numbers, not a heading: name its {len(cells)} columns, for instance "
-            "--columns " + ",".join(f"{sensor[0]}{axis}" for axis in "xyz")
+            f"{path}:{at}: the first line is numbers, not a heading: name its {len(cells)} columns, for "
+            "instance --columns " + ",".join(f"{sensor[0]}{axis}" for axis in "xyz")
         )
     known = [_column(cell) for cell in cells]
+    # Of words without commas one may happen to be a name: "# my recording".
+    if first.startswith("#") and None in known and ("," not in first or not any(known)):
+        raise DataError(
+            f"{path}:{at}: a comment, not a heading: take it away, so that the first line names the columns, "
+            "or name them with --columns"
+        )
     quantities = {column.quantity for column in known if column is not None}
     counts = any(options.unit(triad) == COUNTS for triad in TRIADS)
     half = ("gyroscope" in quantities) != ("accelerometer" in quantities)
     if None not in known and (counts or half or "time" not in quantities):
-        return _read_table(path, _check_columns(known, cells, f"{path}:1"), True, options)
+        return _read_table(path, _check_columns(known, cells, f"{path}:{at}"), at, options)
     return _of_recording(path, _open_csv(path, options), "csv")
 
 
@@ -351,9 +362,9 @@ def read_stamps_table(
 
     Raises DataError naming file, line and value.
     """
-    with path.open(encoding="utf-8", errors="replace") as file:
-        first = _cells(file.readline().strip().lstrip("#").strip())
-    heading = not all(_is_number(cell) for cell in first)
+    at_line, text = _first_line(path, comments=options.columns is None)
+    first = _cells(text.lstrip("#").strip())
+    heading = 0 if all(_is_number(cell) for cell in first) else at_line
     names = options.columns.split(",") if options.columns else first
     if not heading and not options.columns:
         raise DataError(f"{path}: the first line is numbers: --columns device_ns,host_ns names them")
@@ -375,10 +386,10 @@ def read_stamps_table(
         raise DataError(f"{path}: a column of the device's times and one of the host's are needed")
     times: dict[str, list[int]] = {kind: [] for kind in at}
     counts: dict[str, int] = {}
-    with path.open(encoding="utf-8", errors="replace", newline=None) as file:
+    with path.open(encoding="utf-8-sig", errors="replace", newline=None) as file:
         for number, line in enumerate(file, start=1):
             text = line.strip()
-            if (number == 1 and heading) or not text or text.startswith("#"):
+            if number == heading or not text or text.startswith("#"):
                 continue
             if not line.endswith("\n"):
                 counts["rows.skipped.no_line_end"] = 1
