@@ -16,6 +16,7 @@ import libloc
 SCALE = np.array([[1.01, 0.002, -0.004], [0.002, 0.985, 0.003], [-0.004, 0.003, 1.02]])
 OFFSET = np.array([0.3, -0.2, 0.1])  # [m/s^2]
 GYRO_BIAS = np.array([0.02, -0.01, 0.005])  # [rad/s]
+GYRO_MATRIX = np.array([[1.03, 0.02, -0.03], [-0.015, 0.97, 0.01], [0.005, -0.025, 1.01]])  # not symmetric
 RATE = 100
 
 
@@ -26,7 +27,7 @@ def run(capsys, *arguments, code=0) -> str:
     return out.out + out.err
 
 
-def poses(path, count=24, seed=5):
+def poses(path, count=24, seed=5, gyro_matrix=GYRO_MATRIX):
     """A device that is put down in random poses; accelerometer and gyroscope distorted."""
     rng = np.random.default_rng(seed)
     still, turn = 2.0, 1.0
@@ -41,7 +42,7 @@ def poses(path, count=24, seed=5):
     gyro = np.zeros((len(t), 3))
     gyro[1:] = (rotation[:-1].inv() * rotation[1:]).as_rotvec() * RATE
     force = rotation.inv().apply([0, 0, GRAVITY])
-    gyro += GYRO_BIAS + 1e-3 * rng.normal(size=gyro.shape)
+    gyro = np.linalg.solve(gyro_matrix, gyro.T).T + GYRO_BIAS + 1e-3 * rng.normal(size=gyro.shape)
     force = np.linalg.solve(SCALE, force.T).T + OFFSET + 1e-2 * rng.normal(size=force.shape)
     lines = ["time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"]
     for i in range(len(t)):
@@ -65,7 +66,8 @@ def test_accelerometer_and_gyroscope_into_one_rig(tmp_path, capsys):
     assert np.all(np.abs(a.matrix - SCALE) < 5 * a.quality.matrix_sigma)
     assert (a.quality.method, a.quality.samples) == ("still-poses", 24)
     assert np.abs(g.bias - GYRO_BIAS).max() < 5e-4
-    assert np.abs(g.matrix - np.eye(3)).max() < 0.01
+    assert np.abs(g.matrix - GYRO_MATRIX).max() < 5e-3  # a transposed one is off by 0.035
+    assert np.all(np.abs(g.matrix - GYRO_MATRIX) < 5 * g.quality.matrix_sigma)
     names = {p.name for p in report.iterdir()}
     assert names == {"report.html", "stillness.png", "residuals.png", "spheres.png", "coverage.png"}
     names = {p.name for p in (tmp_path / "gyro").iterdir()}
@@ -345,6 +347,51 @@ def test_magnetometer_is_turned_to_the_imu(tmp_path, capsys):
     assert "keep the magnetometer's own axes" in text
     matrix = libloc.read_rig(rig).magnetometer.triad.matrix
     assert np.array_equal(matrix, matrix.T)
+
+
+def test_magnetometer_is_turned_to_the_calibrated_imu(tmp_path, capsys):
+    """The rig's IMU decides where body's axes are: here its chip is turned by 25 deg, scaled and offset."""
+    r = turning_body(8000)
+    clean = r.field.copy()
+    chip = Rotation.from_euler("zyx", [25, -10, 5], degrees=True).as_matrix()
+    r.field = Rotation.from_euler("zyx", [90, 10, -5], degrees=True).apply(clean)
+    gyro, force = chip @ GYRO_MATRIX, chip @ SCALE
+    r.gyro = np.linalg.solve(gyro, r.gyro.T).T + GYRO_BIAS
+    r.force = np.linalg.solve(force, r.force.T).T + OFFSET
+    write_csv(tmp_path / "own.csv", r)
+
+    def calibrated(rig):
+        rig.imu = libloc.ImuCalibration()
+        rig.imu.gyroscope.matrix, rig.imu.gyroscope.bias = gyro, GYRO_BIAS
+        rig.imu.accelerometer.matrix, rig.imu.accelerometer.bias = force, OFFSET
+
+    def error_deg(path):
+        triad = libloc.read_rig(path).magnetometer.triad
+        corrected = (r.field - triad.bias) @ triad.matrix.T
+        length = np.linalg.norm(corrected, axis=1) * np.linalg.norm(clean, axis=1)
+        return np.rad2deg(np.arccos(np.clip((corrected * clean).sum(1) / length, -1, 1))).mean()
+
+    libloc.update_rig(tmp_path / "rig.yaml", calibrated)
+    run(capsys, "magnetometer", tmp_path / "own.csv", "--out", tmp_path / "rig.yaml")
+    assert error_deg(tmp_path / "rig.yaml") < 0.5
+    run(capsys, "magnetometer", tmp_path / "own.csv", "--out", tmp_path / "new.yaml")
+    assert error_deg(tmp_path / "new.yaml") > 10
+
+
+def test_the_altitude_is_heeded(tmp_path, capsys):
+    """The field of a dipole falls with the cube of the distance: by 1.4 % in 30 km."""
+    pytest.importorskip("pygeomag")
+    write_csv(tmp_path / "own.csv", turning_body(4000))
+    place = ("--latitude", 48.9, "--longitude", 2.4, "--date", "2024-06-01", "--no-alignment")
+    expected, norms = [], []
+    for altitude in (0, 30_000):
+        rig = tmp_path / f"{altitude}.yaml"
+        text = run(capsys, "magnetometer", tmp_path / "own.csv", *place, "--altitude", altitude, "--out", rig)
+        expected.append(float(re.search(r"expected here +([\d.]+)", text)[1]))
+        norms.append(np.cbrt(np.linalg.det(libloc.read_rig(rig).magnetometer.triad.matrix)))
+    fallen = (6371 / 6401) ** 3
+    assert expected[1] / expected[0] == pytest.approx(fallen, abs=2e-3)
+    assert norms[1] / norms[0] == pytest.approx(fallen, abs=2e-3)
 
 
 def test_the_magnetic_model(tmp_path, capsys):
