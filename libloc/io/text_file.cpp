@@ -12,6 +12,22 @@ namespace {
 
 constexpr std::size_t kLongestLine = 65536;
 
+// What is to be replaced when path is written.
+std::filesystem::path behind_links(const std::filesystem::path& path) {
+  const auto status = status_of(path);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    throw DataError(path.string() + ": cannot be written: is no regular file");
+  }
+  std::error_code error;
+  if (!std::filesystem::is_symlink(path, error)) return path;
+  if (!std::filesystem::exists(status)) {
+    throw DataError(path.string() + ": cannot be written: the link leads to no file");
+  }
+  auto target = std::filesystem::canonical(path, error);
+  if (error) throw DataError(path.string() + ": " + error.message());
+  return target;
+}
+
 }  // namespace
 
 std::filesystem::file_status status_of(const std::filesystem::path& path) {
@@ -116,11 +132,22 @@ void append_number(std::string& text, double value) {
   text.append(buffer.data(), end);
 }
 
-AtomicFile::AtomicFile(std::filesystem::path path)
-    : path_(std::move(path)), temporary_(path_.string() + "." + std::to_string(::getpid()) + ".tmp") {
+AtomicFile::AtomicFile(const std::filesystem::path& path)
+    : path_(behind_links(path)), temporary_(path_.string() + "." + std::to_string(::getpid()) + ".tmp") {
   file_.imbue(std::locale::classic());  // the global one may write 1280 as 1.280
   file_.open(temporary_, std::ios::binary | std::ios::trunc);
   if (!file_) throw DataError(path_.string() + ": cannot be written");
+  const auto old = status_of(path_);
+  if (!std::filesystem::exists(old)) return;
+  std::error_code error;
+  // Before anything is in it: what only its owner may read stays so.
+  std::filesystem::permissions(temporary_, old.permissions(), error);
+  if (error) {
+    file_.close();
+    std::error_code ignored;
+    std::filesystem::remove(temporary_, ignored);
+    throw DataError(path_.string() + ": its permissions cannot be kept: " + error.message());
+  }
 }
 
 AtomicFile::~AtomicFile() {

@@ -64,11 +64,12 @@ std::optional<TimeNs> parse_time(std::string_view text, int exponent);
 /// Shortest text that reads back as the same double.
 void append_number(std::string& text, double value);
 
-/// A new file beside path that takes its place in commit(): a reader sees the old or the new one, never half.
+/// A new file beside path that takes its place in commit(): a reader sees the old or the new one, never half. A
+/// symbolic link stays one, what it leads to is replaced; the new file has the permissions of the old one.
 class AtomicFile {
  public:
-  /// @throws DataError when it cannot be made.
-  explicit AtomicFile(std::filesystem::path path);
+  /// @throws DataError when it cannot be made, for a link that leads nowhere, and for what is no regular file.
+  explicit AtomicFile(const std::filesystem::path& path);
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
   ~AtomicFile();

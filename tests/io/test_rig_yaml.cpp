@@ -252,6 +252,25 @@ TEST_F(RigYaml, an_update_that_fails_leaves_the_file_as_it_was) {
   expect_data_error([&] { update_rig(file("absent/rig.yaml"), change_nothing); }, {"rig.yaml", "cannot be written"});
 }
 
+TEST_F(RigYaml, links_and_permissions_stay) {
+  namespace fs = std::filesystem;
+  fs::create_directory(file("folder"));
+  fs::create_symlink("folder/real.yaml", file("link.yaml"));
+  fs::create_symlink("link.yaml", file("second.yaml"));
+  expect_data_error([&] { write_rig(file("second.yaml"), Rig{}); }, {"second.yaml", "leads to no file"});
+  write_rig(file("folder/real.yaml"), Rig{});
+  const auto owner_only = fs::perms::owner_read | fs::perms::owner_write;
+  fs::permissions(file("folder/real.yaml"), owner_only);
+  update_rig(file("second.yaml"), [](Rig& rig) { rig.gps = GpsCalibration{}; });
+  EXPECT_TRUE(fs::is_symlink(file("second.yaml")));
+  EXPECT_TRUE(fs::is_symlink(file("link.yaml")));
+  EXPECT_FALSE(fs::is_symlink(file("folder/real.yaml")));
+  EXPECT_TRUE(read_rig(file("folder/real.yaml")).gps);
+  EXPECT_EQ(fs::status(file("folder/real.yaml")).permissions(), owner_only);
+  EXPECT_EQ(std::distance(fs::directory_iterator(file("folder")), fs::directory_iterator{}), 1) << "nothing is left";
+  expect_data_error([&] { write_rig(file("folder"), Rig{}); }, {"folder", "no regular file"});
+}
+
 TEST_F(RigYaml, errors_name_file_line_and_key) {
   expect_error("rate_hz: 200", "rate_hx: 200", {"changed.yaml:", "'imu.rate_hz' is missing"});
   expect_error("imu:\n", "imu:\n  weight: 3\n", {"changed.yaml:3", "'imu.weight' is not known"});
