@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::int64_t kMinSamples = 20;
 constexpr double kMinDurationS = 2;
+constexpr double kSkewSpreadPpm = 5;
 
 std::string fixed(double value, int digits) {
   const double scale = std::pow(10.0, digits);
@@ -28,7 +29,8 @@ double warm_up_s(const ClockModelOptions& options, double duration_s) {
   return std::min(options.window_s, duration_s / 4);
 }
 
-void judge(ClockCalibrationResult& r, const ClockModelOptions& options) {
+// @param skew_noise_ppm what jitter leaves of the skew's error, root mean square
+void judge(ClockCalibrationResult& r, const ClockModelOptions& options, double skew_noise_ppm) {
   Quality& q = r.quality;
   const ClockCounts& c = r.counts;
   if (c.used < kMinSamples || r.duration_s < kMinDurationS) {
@@ -62,6 +64,13 @@ void judge(ClockCalibrationResult& r, const ClockModelOptions& options) {
   if (share(c.suspects) > 0.1) {
     q.lower_to(Verdict::kWarn, fixed(100 * share(c.suspects), 1) +
                                    " % of the samples fit no line: the arrivals may not belong to the stamps.");
+  }
+  // Crystals wander by a ppm or two; the jitter's own part is in the sigma of the skew.
+  const double apart = r.skew_max_ppm - r.skew_min_ppm;
+  if (apart > kSkewSpreadPpm + 6 * skew_noise_ppm) {
+    q.lower_to(Verdict::kWarn, "The skew was between " + fixed(r.skew_min_ppm, 2) + " and " + fixed(r.skew_max_ppm, 2) +
+                                   " ppm: more than jitter and a crystal explain. One of the clocks was set or slewed "
+                                   "(NTP?), or the delay of the arrivals changed. Record again.");
   }
   if (std::abs(r.skew_ppm) > 500) {
     q.lower_to(Verdict::kWarn, "The skew of " + fixed(r.skew_ppm, 1) +
@@ -144,7 +153,7 @@ ClockCalibrationResult calibrate_clock(std::span<const TimeNs> device_times_ns, 
     out.jitter_max_ns = *std::max_element(lateness.begin(), lateness.end());
   }
   if (!steps.empty()) out.rate_hz = 1 / quantile(steps, 0.5);
-  judge(out, options);
+  judge(out, options, std::sqrt(skew_var));
   return out;
 }
 

@@ -1,6 +1,7 @@
 // What a recording of stamps and arrivals says about its clock.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <string>
 #include <vector>
@@ -78,6 +79,29 @@ TEST(CalibrateClock, what_happened_is_told) {
   EXPECT_TRUE(any_reason_has(r.quality, "The host's clock was set once"));
   EXPECT_EQ(r.epochs, 3);
   EXPECT_NEAR(r.skew_ppm, 50, 1);
+}
+
+TEST(CalibrateClock, a_small_step_or_a_slew_of_the_host_is_not_good_enough) {
+  struct Shift {
+    double ms;
+    double duration_s;
+  };
+  // At half of 300 s. The slews by 500, 100 and 10 ppm.
+  for (const Shift& shift : {Shift{10, 0}, Shift{-10, 0}, Shift{1, 0}, Shift{-1, 0}, Shift{5, 10}, Shift{-5, 10},
+                             Shift{3, 30}, Shift{1, 100}, Shift{-1, 100}}) {
+    Times t = times_of(ClockSimulation::usb_imu(), 300);
+    for (std::size_t i = 0; i < t.host.size(); ++i) {
+      const double s = static_cast<double>(i) / 200 - 150;
+      const double part = s < 0 ? 0 : shift.duration_s > 0 ? std::min(1.0, s / shift.duration_s) : 1;
+      t.host[i] += static_cast<TimeNs>(1e6 * shift.ms * part);
+    }
+    const ClockCalibrationResult r = calibrate_clock(t.device, t.host);
+    EXPECT_EQ(r.quality.verdict, Verdict::kWarn)
+        << shift.ms << " ms within " << shift.duration_s << " s, skew " << r.skew_min_ppm << " to " << r.skew_max_ppm;
+    EXPECT_TRUE(any_reason_has(r.quality, "The host's clock was set") || any_reason_has(r.quality, "slewed"));
+  }
+  const Times clean = times_of(ClockSimulation::usb_imu(), 300);
+  EXPECT_EQ(calibrate_clock(clean.device, clean.host).quality.verdict, Verdict::kOk);
 }
 
 TEST(CalibrateClock, arrivals_that_are_copies_are_found_out) {
