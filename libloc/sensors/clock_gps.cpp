@@ -20,7 +20,9 @@ constexpr int kDoubt = 3;  // labels or pulses in a row that disagree: no answer
 constexpr std::int64_t kLargestSecond = 9'000'000'000;  // in int64 nanoseconds
 // Labels from whose lateness the pairing is judged, and how far from the cut they must be: in deviations of one, and of
 // the mean.
-constexpr std::size_t kPhasesToPair = 8;
+constexpr std::size_t kPhasesToPair = 4;
+constexpr std::size_t kPhasesToTrust = 8;  // their spread; before, it is taken to be this at least:
+constexpr double kSpreadOfFewS = 0.04;
 constexpr double kSigmasToPair = 3;
 constexpr double kSigmasToStay = 2.5;
 constexpr double kSigmasOfMean = 5;
@@ -214,7 +216,8 @@ void GpsClock::judge_pairing(TimeNs off_ns) {
   for (std::size_t i = 0; i < count; ++i) mean += phases_[i] / n;
   double sum = 0;
   for (std::size_t i = 0; i < count; ++i) sum += (phases_[i] - mean) * (phases_[i] - mean);
-  const double spread = std::max(kLeastSpreadS, std::sqrt(sum / std::max(1.0, n - 1)));
+  const double spread =
+      std::max(count < kPhasesToTrust ? kSpreadOfFewS : kLeastSpreadS, std::sqrt(sum / std::max(1.0, n - 1)));
   const double reach = spread * (paired_ ? kSigmasToStay : kSigmasToPair);
   const double reach_of_mean = kSigmasOfMean * spread / std::sqrt(n);
   // Jitter makes late, not early: what reaches across the early end are single labels, which are outvoted.
@@ -274,6 +277,8 @@ bool GpsClock::pulses_answer() const {
 GpsClockBasis GpsClock::basis() const {
   if (pulses_answer()) return GpsClockBasis::kPulses;
   // Labels that disagree with pulses are no better alone; nor are they after the host's clock was set.
+  // With a train of pulses it takes a few more labels to know what they are worth.
+  if (locked_ && !paired_ && phase_count_ < kPhasesToPair) return GpsClockBasis::kNone;
   if ((second_ && paired_) || (locked_ && counts_.pulse_locks > 1)) return GpsClockBasis::kNone;
   if (!label_model_.ready() || label_model_.doubtful()) return GpsClockBasis::kNone;
   return GpsClockBasis::kLabels;
