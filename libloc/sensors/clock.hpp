@@ -9,6 +9,14 @@
 // bins. Between fits the tangent at the newest bin extrapolates. From the first sample on there is an answer, with a
 // sigma that says how little is known: bins are short at first and double with the span.
 //
+// sigma holds for jitter that is often almost nothing, as exponential or uniform jitter is (error/sigma near 1). Where
+// jitter is seldom near its minimum the least late samples are late themselves, and sigma does not know: error/sigma
+// (rms) is 3.2 for gamma jitter of shape 4 and 4.3 for log-normal jitter of deviation 1, both with a mean near 1 ms.
+//
+// A step or slew of the host's clock shows when jitter no longer explains that all samples are late: after about 20
+// jitters / step samples, 3 at least. From then on it is in sigma; a new line begins after step_s. A lasting change of
+// the minimum delay looks the same and is taken for a step.
+//
 // Survived and counted: a device that starts anew, counters that jump, a host clock that is set, gaps, duplicates,
 // samples out of order, single absurd times. See ClockCounts.
 //

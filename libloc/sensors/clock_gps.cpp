@@ -20,9 +20,9 @@ constexpr int kDoubt = 3;  // labels or pulses in a row that disagree: no answer
 constexpr std::int64_t kLargestSecond = 9'000'000'000;  // in int64 nanoseconds
 // Labels from whose lateness the pairing is judged, and how far from the cut they must be: in deviations of one, and of
 // the mean.
-constexpr std::size_t kPhasesToPair = 4;
+constexpr std::size_t kPhasesToPair = 3;
 constexpr std::size_t kPhasesToTrust = 8;  // their spread; before, it is taken to be this at least:
-constexpr double kSpreadOfFewS = 0.04;
+constexpr double kSpreadOfFewS = 0.035;
 constexpr double kSigmasToPair = 3;
 constexpr double kSigmasToStay = 2.5;
 constexpr double kSigmasOfMean = 5;

@@ -221,7 +221,7 @@ TEST(Restamp, labels_only_are_believed_after_waiting_for_pulses) {
   ASSERT_TRUE(first);
   EXPECT_NEAR(static_cast<double>(test::count(source.counts(), "list.read")), 5.2 * 200, 60)
       << "5 s after the first label";
-  EXPECT_LT(std::abs(w.gps_error_us(std::get<ImuMeasurement>(*first))), 200'000);
+  EXPECT_LT(std::abs(w.gps_error_us(std::get<ImuMeasurement>(*first))), 400'000);
   EXPECT_EQ(test::read_all(source).size(), 12'000U - 1);
   EXPECT_EQ(source.status()[1].basis, "labels");
   EXPECT_GT(source.status()[1].sigma_us, 30'000) << "says how little it knows";
@@ -305,7 +305,7 @@ TEST(Restamp, fixes_are_labels_and_get_their_own_time_of_validity) {
       if (base == TimeBase::kGps) {
         EXPECT_EQ(fix.time_ns, fix.gps_time_ns);
       } else {
-        EXPECT_LT(std::abs(static_cast<double>(fix.time_ns - fix.host_time_ns)), 0.5e9);
+        EXPECT_LT(std::abs(static_cast<double>(fix.time_ns - fix.host_time_ns)), 0.7e9);
       }
     }
   }
