@@ -63,7 +63,9 @@ int main(int argc, char** argv) {
   app.add_option("--speed", speed, "1 as recorded, N times as fast, or max: as fast as the estimator takes it")
       ->capture_default_str();
   app.add_option("--start", options.start_s, "Leave out the first seconds of the recording")->capture_default_str();
-  app.add_option("--duration", options.duration_s, "Seconds of the recording to play, 0: all")->capture_default_str();
+  app.add_option("--duration", options.duration_s,
+                 "Seconds of the recording to play, or of a receiver to listen to; 0: all")
+      ->capture_default_str();
   CLI::Option* wait = app.add_option("--wait-for-estimator", wait_for_estimator,
                                      "Seconds to wait for an estimator before the first sample");
   app.add_option("--window", options.window, "With --speed max: IMU samples on their way at a time")
@@ -85,7 +87,10 @@ int main(int argc, char** argv) {
     if (wait->count() > 0) options.wait_for_estimator_s = wait_for_estimator;
     if (!config.empty()) loc::load_rig(config);
     options.live = loc::is_live(source.kind);
-    options.check();  // before a device is touched
+    // Before a device is touched.
+    options.check();
+    time_base.check(source.kind);
+    if (options.live) source.gps.check();
     // The source is made first and waits in the driver's run() only.
     loc::Driver* running = nullptr;
     source.gps.on_idle = [&running] {
@@ -95,7 +100,7 @@ int main(int argc, char** argv) {
       if (running != nullptr) running->set_trouble(text);
     };
     source.gps.on_time_event = [&time_base](const loc::GpsTimeEvent& event) { time_base.take(event); };
-    loc::Driver driver(options, time_base.wrap(loc::open_source(source), options.lcm_url, loc::is_live(source.kind)));
+    loc::Driver driver(options, time_base.wrap(loc::open_source(source), options.lcm_url, source.kind));
     running = &driver;
     spdlog::info("event=started source=\"{}\" speed={} url={}", options.source_name, speed, options.lcm_url);
     try {

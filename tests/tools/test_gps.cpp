@@ -121,6 +121,73 @@ TEST_F(LiveGps, AServerThatHangsUpInTheMiddleOfASentence) {
   EXPECT_EQ(fixes_.back().gps_time_ns, epoch_gps_time_ns(100));
 }
 
+// RMC as epoch() has it, of another day.
+std::string rmc_of(const std::string& date, const std::string& time) {
+  return sentence("GNRMC," + time + ",A,4500.0000,N,00730.0000,E,1.0,90.0," + date + ",,,A");
+}
+
+TEST_F(LiveGps, OldDatesStayAsTheyAreAndRolledOnesAreMendedAloud) {
+  SerialCable cable(path("gps"));
+  start_driver({"gps-serial", path("gps"), "--silence", "0.5", "--leap-seconds", "18"});
+  ASSERT_TRUE(connected(1)) << log();
+  ASSERT_TRUE(cable.send(rmc_of("260514", "120000.00")));
+  ASSERT_TRUE(receive(1)) << log();
+  EXPECT_EQ(fixes_[0].gps_time_ns, *gps_from_utc({{2014, 5, 26}, 12, 0, 0, 0}, LeapSeconds::constant(18)));
+  EXPECT_EQ(log().find("event=gps_date"), std::string::npos);
+  ASSERT_TRUE(cable.send(rmc_of("080407", "120001.00")));
+  ASSERT_TRUE(receive(2)) << log();
+  EXPECT_EQ(fixes_[1].gps_time_ns, *gps_from_utc({{2026, 11, 22}, 12, 0, 1, 0}, LeapSeconds::constant(18)));
+  EXPECT_NE(log().find("tells 2007-04-08, which is taken for 2026-11-22"), std::string::npos) << log();
+  EXPECT_EQ(end_and_count("gps.rollover_mended"), 1);
+}
+
+TEST_F(LiveGps, AFixAndItsLossAreTold) {
+  SerialCable cable(path("gps"));
+  start_driver({"gps-serial", path("gps"), "--silence", "0.4"});
+  ASSERT_TRUE(wait_for([&] { return log().find("event=gps_no_fix state=\"none so far\"") != std::string::npos; }));
+  EXPECT_EQ(log().find("event=gps_well"), std::string::npos) << "nothing has come";
+  const auto lines = [&](const std::string& what) {
+    std::size_t n = 0;
+    for (auto at = log().find(what); at != std::string::npos; at = log().find(what, at + 1)) ++n;
+    return n;
+  };
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(cable.send(epoch(i)));
+  ASSERT_TRUE(receive(3)) << log();
+  EXPECT_NE(log().find("event=gps_fix time=2026-11-22T12:00:00"), std::string::npos) << log();
+  EXPECT_NE(log().find("satellites=9 fix=3d"), std::string::npos) << log();
+  EXPECT_NE(log().find("event=gps_well"), std::string::npos) << "after silence";
+  ASSERT_TRUE(wait_for([&] { return log().find("event=gps_no_fix state=\"lost\"") != std::string::npos; })) << log();
+  ASSERT_TRUE(cable.send(epoch(5)));
+  ASSERT_TRUE(wait_for([&] { return lines("event=gps_fix ") == 2; })) << log();
+  EXPECT_EQ(lines("event=gps_no_fix"), 2U) << "once for each change";
+}
+
+TEST_F(LiveGps, WhatWasNotSentIsNotCountedAsPublished) {
+  SerialCable cable(path("gps"));
+  start_driver({"gps-serial", path("gps")});
+  ASSERT_TRUE(connected(1)) << log();
+  for (int i = 0; i < 5; ++i) ASSERT_TRUE(cable.send(epoch(i)));
+  ASSERT_TRUE(receive(5)) << log();
+  ASSERT_TRUE(hub_.process.stop(3 * kSecond));
+  for (int i = 10; i < 20; ++i) {
+    ASSERT_TRUE(cable.send(epoch(i)));
+    ASSERT_TRUE(sleep_for(150 * kMs));
+  }
+  const std::int64_t read = end_and_count("gps.read");
+  EXPECT_EQ(read, 15);
+  EXPECT_GT(end_and_count("live.not_sent"), 5);
+  EXPECT_EQ(end_and_count("gps.published") + end_and_count("live.not_sent"), read);
+}
+
+TEST_F(LiveGps, TheDurationIsThatOfTheClockOnTheWall) {
+  SerialCable cable(path("gps"));
+  start_driver({"gps-serial", path("gps"), "--duration", "1"});
+  ASSERT_TRUE(connected(1)) << log();
+  EXPECT_TRUE(driver_->wait(10 * kSecond)) << "also when nothing comes" << log();
+  EXPECT_TRUE(driver_->succeeded()) << log();
+  EXPECT_NE(log().find("event=ended interrupted=false"), std::string::npos) << log();
+}
+
 TEST_F(LiveGps, WhatCannotBeOpenedSaysWhatToDo) {
   std::ofstream(path("log.nmea")) << epoch(0);
   const std::vector<std::tuple<Arguments, int, std::string>> wrong = {
@@ -129,6 +196,13 @@ TEST_F(LiveGps, WhatCannotBeOpenedSaysWhatToDo) {
       {{"gps-serial", "/dev/null"}, 1, "is not a serial port"},
       {{"gps-serial", "/dev/null", "--baud", "9601"}, 2, "must be one of 1200"},
       {{"gps-serial", "/dev/null", "--silence", "0"}, 2, "silence"},
+      {{"gps-serial", path("absent"), "--silence", "1e300"}, 2, "silence"},
+      {{"gps-serial", path("absent"), "--reconnect", "1e300"}, 2, "reconnect"},
+      {{"gps-serial", path("absent"), "--duration", "1e300"}, 2, "duration"},
+      {{"gps-serial", path("absent"), "--time-base", "utc"}, 2, "must be device, host or gps"},
+      {{"gps-serial", path("absent"), "--gps-label-delay", "1e300"}, 2, "--gps-label-delay"},
+      {{"gpsd", "127.0.0.1:1", "--silence", "0"}, 2, "silence"},
+      {{"nmea", path("log.nmea"), "--time-base", "host"}, 2, "its fixes are on GPS time"},
       {{"gps-tcp", "127.0.0.1:1"}, 1, "Connection refused"},
       {{"gps-tcp", "127.0.0.1"}, 2, "is not HOST:PORT"},
       {{"gps-tcp", "127.0.0.1:70000"}, 2, "is not HOST:PORT"},
@@ -144,6 +218,13 @@ TEST_F(LiveGps, WhatCannotBeOpenedSaysWhatToDo) {
     EXPECT_EQ(run("loc-driver", all, path("wrong.err")), code) << arguments[0] << " " << arguments[1];
     EXPECT_NE(text_of(path("wrong.err")).find(text), std::string::npos) << text << "\n" << text_of(path("wrong.err"));
   }
+}
+
+TEST_F(LiveGps, ALogIsOnGpsTime) {
+  std::ofstream(path("log.nmea")) << epoch(0) << epoch(1) << epoch(2);
+  start_driver({"nmea", path("log.nmea"), "--speed", "100", "--time-base", "gps"});
+  ASSERT_TRUE(receive(3)) << log();
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(fixes_[static_cast<std::size_t>(i)].time_ns, epoch_gps_time_ns(i));
 }
 
 TEST_F(LiveGps, ALogIsPlayedLikeAnyRecording) {

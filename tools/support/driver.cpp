@@ -15,10 +15,15 @@ namespace {
 constexpr TimeNs kSecond = 1'000'000'000;
 constexpr TimeNs kAskEvery = 20'000'000;  // while waiting for the estimator
 constexpr int kPollMs = 5;
+constexpr double kLongestS = 1e9;  // 30 years
+constexpr double kLongestWaitS = 1e6;
 
 }  // namespace
 
 void DriverOptions::check() const {
+  const auto at_most = [](const char* name, double value, double most) {
+    require(value <= most, name, value, "must be at most " + std::to_string(static_cast<std::int64_t>(most)) + " s");
+  };
   require_not_negative("speed", speed);
   require_not_negative("start", start_s);
   require_not_negative("duration", duration_s);
@@ -26,6 +31,11 @@ void DriverOptions::check() const {
   require_positive("answer-timeout", answer_timeout_s);
   require_not_negative("reconnect-timeout", reconnect_timeout_s);
   if (wait_for_estimator_s) require_positive("wait-for-estimator", *wait_for_estimator_s);
+  at_most("start", start_s, kLongestS);
+  at_most("duration", duration_s, kLongestS);
+  at_most("answer-timeout", answer_timeout_s, kLongestWaitS);
+  at_most("reconnect-timeout", reconnect_timeout_s, kLongestWaitS);
+  at_most("wait-for-estimator", wait_for_estimator_s.value_or(0), kLongestWaitS);
   require(!live || (speed == 1 && start_s == 0), "--speed and --start are for recordings, not for live sources");
 }
 
@@ -61,11 +71,17 @@ void Driver::publish_all() {
   const TimeNs duration_ns = from_seconds(options_.duration_s);
   std::optional<TimeNs> begin;
   bool started = false;
-  next_report_ns_ = steady_now();
+  next_report_ns_ = begin_ns_ = steady_now();
   while (!stop_requested()) {
     std::optional<Measurement> measurement = source_->next();
     if (!measurement) return;
     const TimeNs time = stamp_of(*measurement).time_ns;
+    if (options_.live) {
+      if (duration_is_over()) return;
+      publish_measurement(*measurement);
+      report_each_second();
+      continue;
+    }
     if (!begin) begin = time + start_ns;
     started = started || time >= *begin;
     if (!started) {
@@ -73,7 +89,7 @@ void Driver::publish_all() {
       continue;
     }
     if (duration_ns > 0 && time - *begin >= duration_ns) return;
-    if (!options_.live && !sleep_for(pacer_.wait_ns(time, steady_now()))) return;
+    if (!sleep_for(pacer_.wait_ns(time, steady_now()))) return;
     if (options_.speed == 0 && kind_of(*measurement) == StreamKind::kImu) wait_for_window();
     if (stop_requested()) return;
     publish_measurement(*measurement);
@@ -146,22 +162,23 @@ void Driver::wait_until_taken() {
 }
 
 template <class Message>
-void Driver::send(const std::string& channel, const Message& message) {
-  if (publisher_.publish(channel, message)) return;
+bool Driver::send(const std::string& channel, const Message& message) {
+  if (publisher_.publish(channel, message)) return true;
   if (options_.live) {
     // A sensor does not wait; the estimator sees the jump of the sequence.
     if (not_sent_++ == 0) spdlog::warn("event=connection_lost url={}", options_.lcm_url);
-    return;
+    return false;
   }
   // A recording can wait: nothing is lost while the hub is away.
   spdlog::warn("event=connection_lost url={}", options_.lcm_url);
   const TimeNs give_up = steady_now() + from_seconds(options_.reconnect_timeout_s);
   while (!publisher_.publish(channel, message)) {
-    if (!sleep_for(kSecond / 20)) return;
+    if (!sleep_for(kSecond / 20)) return false;
     if (steady_now() > give_up) {
       throw std::runtime_error("the connection to " + options_.lcm_url + " is lost and does not come back");
     }
   }
+  return true;
 }
 
 void Driver::publish_measurement(Measurement& measurement) {
@@ -171,7 +188,7 @@ void Driver::publish_measurement(Measurement& measurement) {
   stamp.sequence = next_sequence_[{kind, image != nullptr ? image->camera : 0}]++;
   if (!options_.live) stamp.host_time_ns = host_now();
   const std::string& channel = options_.channels[static_cast<std::size_t>(kind)];
-  std::visit([&](const auto& m) { send(channel, to_message(m)); }, measurement);
+  if (!std::visit([&](const auto& m) { return send(channel, to_message(m)); }, measurement)) return;
   ++published_[static_cast<std::size_t>(kind)];
   if (kind == StreamKind::kImu) flow_.sent(stamp.sequence);
 }
@@ -192,8 +209,14 @@ void Driver::publish_status(std::int8_t state, const std::string& text) {
   if (!publisher_.publish(kSourceStatusChannel, message)) spdlog::warn("event=status_not_sent state={}", state);
 }
 
+bool Driver::duration_is_over() const {
+  return options_.duration_s > 0 && begin_ns_ != kNoTime &&
+         steady_now() - begin_ns_ >= from_seconds(options_.duration_s);
+}
+
 void Driver::idle() {
   report_each_second();
+  if (duration_is_over()) source_->stop();
 }
 
 void Driver::set_trouble(const std::string& text) {

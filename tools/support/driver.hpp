@@ -24,7 +24,7 @@ struct DriverOptions {
   std::array<std::string, kStreamKinds> channels;  ///< empty: default_channel()
   double speed = 1;                                ///< 0: as fast as the estimator takes it
   double start_s = 0;                              ///< of the recording, from its first sample
-  double duration_s = 0;                           ///< 0: to the end
+  double duration_s = 0;                           ///< 0: to the end; live by the monotonic clock
   std::int64_t window = 256;                       ///< IMU samples on their way, when speed is 0
   double answer_timeout_s = 10;                    ///< longest silence of the estimator, when speed is 0
   double reconnect_timeout_s = 10;                 ///< longest time without a hub
@@ -45,7 +45,7 @@ class Driver {
   /// @throws DataError when the source cannot be read on; std::runtime_error when no estimator answers or the
   /// connection stays lost.
   void run();
-  /// What a live source calls while it waits, from its next().
+  /// What a live source calls while it waits, from its next(). Stops the source when the duration is over.
   void idle();
   /// What is wrong with a live source, for the status; empty: nothing.
   void set_trouble(const std::string& text);
@@ -53,13 +53,14 @@ class Driver {
 
  private:
   void publish_all();
+  bool duration_is_over() const;
   void wait_for_estimator();
   void wait_for_window();
   void wait_until_taken();
   void poll_answers(int timeout_ms);
   void publish_measurement(Measurement& measurement);
   template <class Message>
-  void send(const std::string& channel, const Message& message);
+  bool send(const std::string& channel, const Message& message);
   void publish_status(std::int8_t state, const std::string& text);
   void report_each_second();
 
@@ -73,6 +74,7 @@ class Driver {
   std::array<std::int64_t, kStreamKinds> published_{};
   std::int64_t left_out_ = 0;  // before start
   TimeNs next_report_ns_ = 0;
+  TimeNs begin_ns_ = kNoTime;  // monotonic
   TimeNs window_wait_ns_ = 0;
   std::string trouble_;
   std::int64_t not_sent_ = 0;  // live

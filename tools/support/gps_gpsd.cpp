@@ -112,8 +112,11 @@ class GpsdSource final : public MeasurementSource {
   GpsdSource(const GpsdSource&) = delete;
   GpsdSource& operator=(const GpsdSource&) = delete;
 
+  void stop() override { reconnection_.stop(); }
+
   std::optional<Measurement> next() override {
-    while (!stop_requested()) {
+    while (!stop_requested() && !reconnection_.stopped()) {
+      reconnection_.look_for_fix();
       if (!connected_) {
         if (!reconnection_.wait()) break;
         try {
@@ -130,6 +133,7 @@ class GpsdSource final : public MeasurementSource {
         reconnection_.trouble(name_ + " tells no position or state: is a receiver attached (gpsd -N DEVICE, cgps)?");
       }
       if (options_.on_idle) options_.on_idle();
+      if (fix) reconnection_.heard(*fix);
       if (fix) return fix;
     }
     return std::nullopt;

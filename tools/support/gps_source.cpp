@@ -20,6 +20,27 @@ constexpr int kPollMs = 50;
 // The pause between two bursts, which a burst does not have: at 4800 baud a byte takes 2 ms.
 constexpr TimeNs kPause = 100'000'000;
 constexpr TimeNs kIdleStep = 100'000'000;
+constexpr double kLongestWaitS = 1e6;
+
+const char* name_of(GpsFixType type) {
+  switch (type) {
+    case GpsFixType::kNone:
+      return "none";
+    case GpsFixType::kTime:
+      return "time";
+    case GpsFixType::k2d:
+      return "2d";
+    case GpsFixType::k3d:
+      return "3d";
+    case GpsFixType::kDifferential:
+      return "differential";
+    case GpsFixType::kFloat:
+      return "rtk_float";
+    case GpsFixType::kFixed:
+      return "rtk_fixed";
+  }
+  return "unknown";
+}
 
 class NmeaStreamSource final : public MeasurementSource {
  public:
@@ -31,13 +52,16 @@ class NmeaStreamSource final : public MeasurementSource {
     connect();
   }
 
+  void stop() override { reconnection_.stop(); }
+
   std::optional<Measurement> next() override {
-    while (!stop_requested()) {
+    while (!stop_requested() && !reconnection_.stopped()) {
       if (!waiting_.empty()) {
         GpsMeasurement fix = waiting_.front();
         waiting_.pop_front();
         return fix;
       }
+      reconnection_.look_for_fix();
       if (!port_) {
         if (!reconnection_.wait()) break;
         try {
@@ -119,6 +143,7 @@ class NmeaStreamSource final : public MeasurementSource {
     if (!fix) return;
     fix->time_ns = fix->host_time_ns;
     fix->sequence = sequence_++;
+    reconnection_.heard(*fix);
     waiting_.push_back(*fix);
   }
 
@@ -141,12 +166,13 @@ void LiveGpsOptions::check() const {
   fix.check();
   require_positive("silence", silence_s);
   require_not_negative("reconnect", reconnect_s);
+  require(silence_s <= kLongestWaitS, "silence", silence_s, "must be at most 1e6 s");
+  require(reconnect_s <= kLongestWaitS, "reconnect", reconnect_s, "must be at most 1e6 s");
 }
 
 void Reconnection::connected(const std::string& name) {
   ++connections_;
   spdlog::info("event=gps_connected name=\"{}\" connections={}", name, connections_);
-  trouble("");
 }
 
 void Reconnection::lost(const std::string& name, const std::string& why) {
@@ -170,13 +196,33 @@ void Reconnection::trouble(const std::string& why) {
   if (options_.on_trouble) options_.on_trouble(why);
 }
 
+void Reconnection::heard(const GpsMeasurement& fix) {
+  if (fix.fix == GpsFixType::kNone) return;
+  last_fix_ns_ = steady_now();
+  if (fix_state_ == FixState::kFix) return;
+  fix_state_ = FixState::kFix;
+  const std::string time =
+      fix.gps_time_ns == kNoTime ? "unknown" : to_text(utc_from_gps(fix.gps_time_ns, options_.fix.leap_seconds));
+  const std::string satellites = fix.satellites < 0 ? "unknown" : std::to_string(fix.satellites);
+  spdlog::info("event=gps_fix time={} satellites={} fix={}", time, satellites, name_of(fix.fix));
+}
+
+void Reconnection::look_for_fix() {
+  const TimeNs now = steady_now();
+  if (last_fix_ns_ == kNoTime) last_fix_ns_ = now;
+  if (fix_state_ == FixState::kNoFix || now - last_fix_ns_ < from_seconds(options_.silence_s)) return;
+  const char* what = fix_state_ == FixState::kFix ? "lost" : "none so far";
+  fix_state_ = FixState::kNoFix;
+  spdlog::warn("event=gps_no_fix state=\"{}\" for_s={:.1f}", what, to_seconds(now - last_fix_ns_));
+}
+
 bool Reconnection::wait() const {
   const TimeNs end = steady_now() + from_seconds(options_.reconnect_s);
-  while (steady_now() < end) {
+  while (steady_now() < end && !stopped_) {
     if (!sleep_for(std::min(kIdleStep, end - steady_now()))) return false;
     if (options_.on_idle) options_.on_idle();
   }
-  return !stop_requested();
+  return !stop_requested() && !stopped_;
 }
 
 void Reconnection::add_to(NamedCounts& counts) const {

@@ -4,6 +4,7 @@
 // gps_time_ns; whoever knows the relation of the clocks puts one for the other.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <string>
@@ -37,12 +38,12 @@ std::unique_ptr<MeasurementSource> open_nmea_stream(GpsConnection connection, Li
 /// were built without libgps.
 std::unique_ptr<MeasurementSource> open_gpsd(const std::string& address, LiveGpsOptions options);
 
-/// The counts of a connection, and when to try again. Internal to the sources of this file.
+/// The state of a connection as it is told, its counts, and when to try again. Internal to the sources of this file.
 class Reconnection {
  public:
   explicit Reconnection(const LiveGpsOptions& options) : options_(options) {}
 
-  /// The connection stands. @param name of it
+  /// The connection stands; all is well when something has come through it. @param name of it
   void connected(const std::string& name);
   void lost(const std::string& name, const std::string& why);
   void failed(const std::string& why);
@@ -52,8 +53,22 @@ class Reconnection {
   bool wait() const;
   void add_to(NamedCounts& counts) const;
 
+  /// What has come: tells the first fix, and the first after there was none.
+  void heard(const GpsMeasurement& fix);
+  /// Called now and then: tells once when there has been no fix for silence_s.
+  void look_for_fix();
+
+  /// See MeasurementSource::stop().
+  void stop() { stopped_ = true; }
+  bool stopped() const { return stopped_; }
+
  private:
+  enum class FixState { kNothingYet, kFix, kNoFix };
+
   const LiveGpsOptions& options_;
+  std::atomic<bool> stopped_ = false;
+  FixState fix_state_ = FixState::kNothingYet;
+  TimeNs last_fix_ns_ = kNoTime;  // monotonic; at first the first look
   std::string trouble_;
   std::int64_t connections_ = 0;
   std::int64_t losses_ = 0;

@@ -1,10 +1,18 @@
 #include "tools/support/time_base.hpp"
 
+#include <cmath>
 #include <utility>
 
+#include "libloc/core/check.hpp"
+#include "tools/support/open_source.hpp"
 #include "tools/support/program.hpp"
 
 namespace loc {
+namespace {
+
+constexpr double kLongestDelayS = 100;
+
+}  // namespace
 
 void TimeBaseWiring::add_options(CLI::App& app) {
   app.add_option(
@@ -23,8 +31,7 @@ void TimeBaseWiring::add_options(CLI::App& app) {
   app.add_option("--gps-label-delay-sigma", sigma_label_delay_s_, "How well that is known [s]")->capture_default_str();
 }
 
-std::unique_ptr<MeasurementSource> TimeBaseWiring::wrap(std::unique_ptr<MeasurementSource> source,
-                                                        const std::string& lcm_url, bool receiver) {
+RestampOptions TimeBaseWiring::restamp_options() const {
   RestampOptions options;
   options.base = parse_time_base(base_);
   if (pulse_label_ != "previous" && pulse_label_ != "next") {
@@ -33,13 +40,35 @@ std::unique_ptr<MeasurementSource> TimeBaseWiring::wrap(std::unique_ptr<Measurem
   options.gps.label = pulse_label_ == "next" ? PulseLabel::kNext : PulseLabel::kPrevious;
   options.wait_s = wait_s_;
   try {
+    const auto require_delay = [](const char* name, double value) {
+      require(std::abs(value) <= kLongestDelayS, name, value, "must be at most 100 s");
+    };
+    require_delay("--gps-label-delay", label_delay_s_);
+    require_delay("--gps-label-delay-sigma", sigma_label_delay_s_);
     options.gps.label_delay_ns = from_seconds(label_delay_s_);
     options.gps.sigma_label_delay_ns = from_seconds(sigma_label_delay_s_);
     options.check();
   } catch (const std::invalid_argument& error) {
     throw UsageError(std::string("--time-base options: ") + error.what());
   }
-  if (options.base == TimeBase::kDevice && !receiver) return source;
+  return options;
+}
+
+void TimeBaseWiring::check(const std::string& source_kind) const {
+  if (restamp_options().base == TimeBase::kHost && source_kind == "nmea") {
+    throw UsageError(
+        "--time-base host: an NMEA log does not hold when its sentences arrived; its fixes are on GPS time "
+        "(--time-base "
+        "gps or device)");
+  }
+}
+
+std::unique_ptr<MeasurementSource> TimeBaseWiring::wrap(std::unique_ptr<MeasurementSource> source,
+                                                        const std::string& lcm_url, const std::string& source_kind) {
+  check(source_kind);
+  RestampOptions options = restamp_options();
+  const bool receiver = is_live(source_kind);
+  if (source_kind == "nmea" || (options.base == TimeBase::kDevice && !receiver)) return source;
   if (receiver || options.base == TimeBase::kGps) {
     link_.emplace(lcm_url);
     options.poll = [this] { link_->poll(*source_); };

@@ -18,17 +18,22 @@ class TimeBaseWiring {
  public:
   void add_options(CLI::App& app);
 
+  /// Before a device is touched. @throws UsageError for an option that is wrong, or a base that this kind of source
+  /// (see SourceSpec) cannot have.
+  void check(const std::string& source_kind) const;
   /// The source in the time base that was asked for; as it is where there is nothing to do.
-  /// @param receiver it is a GPS receiver: it publishes LOC_CLOCK, in any base.
-  /// @throws UsageError for an option that is wrong; as open_lcm.
+  /// @param source_kind a GPS receiver publishes LOC_CLOCK, in any base; an NMEA log is on GPS time as it is.
+  /// @throws as check() and open_lcm.
   std::unique_ptr<MeasurementSource> wrap(std::unique_ptr<MeasurementSource> source, const std::string& lcm_url,
-                                          bool receiver);
+                                          const std::string& source_kind);
   /// For the receiver's handler of time events.
   void take(const GpsTimeEvent& event) {
     if (source_ != nullptr) source_->take(event);
   }
 
  private:
+  RestampOptions restamp_options() const;
+
   std::string base_ = "device";
   std::string pulse_label_ = "previous";
   double wait_s_ = RestampOptions{}.wait_s;
