@@ -23,7 +23,7 @@ constexpr double kSlowTurn = 0.15;    // [rad] in an interval, up to which its m
 constexpr double kFlatDip = 10 * std::numbers::pi / 180;  // the sign of a smaller dip is not trusted
 constexpr std::size_t kLeastIntervals = 20;
 constexpr std::size_t kLeastGravity = 10;  // readings: the scatter of fewer says little
-constexpr double kGravitySigma = 0.01;     // [rad]: no accelerometer shows the vertical better while it is moved
+constexpr double kGravitySigma = 0.002;    // [rad]: no accelerometer shows the vertical better
 
 std::string degrees(double angle) {
   return to_text(std::round(angle * 180 / std::numbers::pi * 100) / 100) + " deg";
@@ -78,6 +78,9 @@ class IntervalBuilder {
     }
     const Eigen::Quaterniond turn = so3::exp(theta);
     now_.d_bias = turn.conjugate().toRotationMatrix() * now_.d_bias - dt * so3::right_jacobian(theta);
+    now_.d_matrix = turn.conjugate().toRotationMatrix() * now_.d_matrix;
+    const Eigen::Vector3d angle = dt / 2 * (last_rate_ + rate);
+    for (int k = 0; k < 3; ++k) now_.d_matrix.middleCols<3>(3 * k) += angle[k] * so3::right_jacobian(theta);
     now_.q_begin_end = (now_.q_begin_end * turn).normalized();
   }
 
@@ -186,6 +189,34 @@ Eigen::Quaterniond best_start(const std::vector<FieldInterval>& intervals) {
   return best;
 }
 
+using ErrorJacobian = Eigen::Matrix<double, 4, kCalibrationErrors>;
+using CalibrationErrors = Eigen::Matrix<double, kCalibrationErrors, 1>;  // in units of their deviations
+
+/// The fit around one point: residuals with the effect of the calibrations' errors, which is linear.
+struct Problem {
+  std::span<const FieldInterval> intervals;
+  Eigen::Quaterniond start;
+  std::vector<ErrorJacobian> effects;
+
+  Problem(const std::vector<FieldInterval>& all, const Eigen::Quaterniond& r, const AlignmentVector& x,
+          const MagnetometerAlignmentOptions& options)
+      : intervals(all), start(r) {
+    effects.reserve(all.size());
+    for (const FieldInterval& k : all) {
+      ErrorJacobian j = alignment_error_jacobian(k, r, x);
+      j.leftCols<9>() *= options.gyroscope_matrix_sigma;
+      j.rightCols<9>() *= options.field_sigma;
+      j.middleCols<3>(12) *= std::numbers::sqrt2 / 2;  // a symmetric matrix without a preferred direction
+      effects.push_back(j);
+    }
+  }
+
+  Eigen::Vector4d residual(std::size_t k, const AlignmentVector& x, const CalibrationErrors& errors,
+                           Eigen::Matrix<double, 4, 8>* jacobian = nullptr) const {
+    return alignment_residual(intervals[k], start, x, jacobian) + effects[k] * errors;
+  }
+};
+
 struct Weights {
   Eigen::VectorXd turn;
   Eigen::VectorXd gravity;
@@ -193,50 +224,56 @@ struct Weights {
 
 /// One over the robust deviation of each kind of residual, times the root of Tukey's weight. A few readings of gravity
 /// agree by chance and would then count for more than all the turning: they are left out.
-Weights weights_at(const std::vector<FieldInterval>& intervals, const Eigen::Quaterniond& start,
-                   const AlignmentVector& x) {
+Weights weights_at(const Problem& problem, const AlignmentVector& x, const CalibrationErrors& errors) {
   std::vector<double> turn;
   std::vector<double> gravity;
-  for (const FieldInterval& k : intervals) {
-    const Eigen::Vector4d r = alignment_residual(k, start, x, nullptr);
+  for (std::size_t k = 0; k < problem.intervals.size(); ++k) {
+    const Eigen::Vector4d r = problem.residual(k, x, errors);
     for (int i = 0; i < 3; ++i) turn.push_back(r[i]);
-    if (k.has_gravity) gravity.push_back(r[3]);
+    if (problem.intervals[k].has_gravity) gravity.push_back(r[3]);
   }
   constexpr double kFloor = 1e-6;  // exact data must not divide by zero
   const double turn_sigma = std::max(kFloor, robust_sigma(turn));
   const bool use_gravity = gravity.size() >= kLeastGravity;
   const double gravity_scatter =
       use_gravity ? robust_sigma(gravity) * small_sample_factor(static_cast<int>(gravity.size()) - 1) : 0;
-  const double gravity_sigma = std::max({kGravitySigma, turn_sigma, gravity_scatter});
-  const auto n = static_cast<Eigen::Index>(intervals.size());
+  const double gravity_sigma = std::max(kGravitySigma, gravity_scatter);
+  const auto n = static_cast<Eigen::Index>(problem.intervals.size());
   Weights w{.turn = Eigen::VectorXd::Zero(n), .gravity = Eigen::VectorXd::Zero(n)};
   for (Eigen::Index k = 0; k < n; ++k) {
-    const FieldInterval& interval = intervals[static_cast<std::size_t>(k)];
-    const Eigen::Vector4d r = alignment_residual(interval, start, x, nullptr);
+    const FieldInterval& interval = problem.intervals[static_cast<std::size_t>(k)];
+    const Eigen::Vector4d r = problem.residual(static_cast<std::size_t>(k), x, errors);
     w.turn[k] = std::sqrt(tukey_weight(r.head<3>().norm() / turn_sigma / std::sqrt(3.0))) / turn_sigma;
-    if (use_gravity && interval.has_gravity) w.gravity[k] = std::sqrt(tukey_weight(r[3] / gravity_sigma)) / gravity_sigma;
+    if (use_gravity && interval.has_gravity)
+      w.gravity[k] = std::sqrt(tukey_weight(r[3] / gravity_sigma)) / gravity_sigma;
   }
   return w;
 }
 
-LeastSquaresResult refine(const std::vector<FieldInterval>& intervals, const Eigen::Quaterniond& start,
-                          const Weights& w, const AlignmentVector& x0) {
-  const auto n = static_cast<Eigen::Index>(intervals.size());
+LeastSquaresResult refine(const Problem& problem, const Weights& w, const Eigen::VectorXd& x0) {
+  const auto n = static_cast<Eigen::Index>(problem.intervals.size());
+  constexpr int kAll = 8 + kCalibrationErrors;
   const ResidualFunction function = [&](const Eigen::VectorXd& x, Eigen::VectorXd& r, Eigen::MatrixXd* jacobian) {
-    r.resize(4 * n + 5);
-    if (jacobian != nullptr) jacobian->setZero(4 * n + 5, 8);
+    r.resize(4 * n + 5 + kCalibrationErrors);
+    if (jacobian != nullptr) jacobian->setZero(r.size(), kAll);
     Eigen::Matrix<double, 4, 8> j;
     for (Eigen::Index k = 0; k < n; ++k) {
+      const auto i = static_cast<std::size_t>(k);
       const Eigen::Vector4d weight(w.turn[k], w.turn[k], w.turn[k], w.gravity[k]);
       r.segment<4>(4 * k) = weight.cwiseProduct(
-          alignment_residual(intervals[static_cast<std::size_t>(k)], start, x, jacobian != nullptr ? &j : nullptr));
-      if (jacobian != nullptr) jacobian->middleRows<4>(4 * k) = weight.asDiagonal() * j;
+          problem.residual(i, x.head<8>(), x.tail<kCalibrationErrors>(), jacobian != nullptr ? &j : nullptr));
+      if (jacobian != nullptr) {
+        jacobian->middleRows<4>(4 * k) << weight.asDiagonal() * j, weight.asDiagonal() * problem.effects[i];
+      }
     }
     // Weak knowledge of bias, dip and delay, so that each is determined in any recording.
-    r.tail<5>() << x.segment<3>(3) / kBiasPrior, x[6], x[7] / kDelayPrior;
+    r.segment<5>(4 * n) << x.segment<3>(3) / kBiasPrior, x[6], x[7] / kDelayPrior;
+    r.tail<kCalibrationErrors>() = x.tail<kCalibrationErrors>();
     if (jacobian != nullptr) {
       for (int i = 0; i < 3; ++i) (*jacobian)(4 * n + i, 3 + i) = 1 / kBiasPrior;
       (*jacobian)(4 * n + 3, 6) = 1;
+      (*jacobian)(4 * n + 4, 7) = 1 / kDelayPrior;
+      jacobian->bottomRightCorner<kCalibrationErrors, kCalibrationErrors>().setIdentity();
     }
   };
   return minimise(function, x0, {.max_iterations = 30});
@@ -246,8 +283,11 @@ LeastSquaresResult refine(const std::vector<FieldInterval>& intervals, const Eig
 /// leaves out (filters of the sensors, disturbed field) lasts longer than one interval. The scores of whole blocks tell
 /// (Liang, Zeger, "Longitudinal data analysis using generalized linear models", 1986); where they say less than the
 /// curvature, the curvature holds.
-Eigen::MatrixXd cautious_covariance(const std::vector<FieldInterval>& intervals, const Eigen::Quaterniond& r,
-                                    const AlignmentVector& x, const Weights& w, const Eigen::MatrixXd& cov) {
+/// @return (8, 8) of AlignmentVector
+Eigen::MatrixXd cautious_covariance(const Problem& problem, const AlignmentVector& x, const CalibrationErrors& errors,
+                                    const Weights& w, const Eigen::MatrixXd& cov_all) {
+  const std::span<const FieldInterval> intervals = problem.intervals;
+  const Eigen::MatrixXd cov = cov_all.topLeftCorner<8, 8>();
   constexpr std::size_t kBlock = 20;
   constexpr std::size_t kLeastBlocks = 8;
   const std::size_t block = std::max<std::size_t>(1, std::min(kBlock, intervals.size() / kLeastBlocks));
@@ -258,8 +298,10 @@ Eigen::MatrixXd cautious_covariance(const std::vector<FieldInterval>& intervals,
     const auto i = static_cast<Eigen::Index>(k);
     const Eigen::Vector4d weight(w.turn[i], w.turn[i], w.turn[i], w.gravity[i]);
     Eigen::Matrix<double, 4, 8> jacobian;
-    const Eigen::Vector4d residual = weight.cwiseProduct(alignment_residual(intervals[k], r, x, &jacobian));
-    score += (weight.asDiagonal() * jacobian).transpose() * residual;
+    const Eigen::Vector4d residual = weight.cwiseAbs2().cwiseProduct(problem.residual(k, x, errors, &jacobian));
+    // Pull of the block on the solution: the calibrations' errors follow, so their columns count too.
+    score += cov_all.topLeftCorner<8, 8>() * (jacobian.transpose() * residual) +
+             cov_all.topRightCorner<8, kCalibrationErrors>() * (problem.effects[k].transpose() * residual);
     if ((k + 1) % block == 0 || k + 1 == intervals.size()) {
       scores += score * score.transpose();
       score.setZero();
@@ -271,7 +313,8 @@ Eigen::MatrixXd cautious_covariance(const std::vector<FieldInterval>& intervals,
   if (llt.info() != Eigen::Success) return cov;
   // In units of the curvature's own deviations the model says 1 in every direction.
   const Eigen::MatrixXd root = llt.matrixL();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(root.transpose() * scores * root);
+  const Eigen::MatrixXd half = llt.matrixL().solve(Eigen::MatrixXd(scores));
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(llt.matrixL().solve(half.transpose().eval()));
   const Eigen::MatrixXd directions = root * eigen.eigenvectors();
   return directions * eigen.eigenvalues().cwiseMax(1.0).asDiagonal() * directions.transpose();
 }
@@ -302,10 +345,9 @@ void judge_unchecked_mirror(const MagnetometerAlignmentOptions& options, Magneto
                                              "magnetometer is mirrored and the field reversed" +
                                              cure + ".");
   } else if (out.angle > kHalfTurn) {
-    out.quality.lower_to(Verdict::kWarn,
-                         "The magnetometer is turned by " + degrees(out.angle) +
-                             " against the IMU, or mirrored and the field reversed, which was not checked" + cure +
-                             ".");
+    out.quality.lower_to(
+        Verdict::kWarn, "The magnetometer is turned by " + degrees(out.angle) +
+                            " against the IMU, or mirrored and the field reversed, which was not checked" + cure + ".");
   } else {
     out.quality.lower_to(Verdict::kFair, asked ? "Whether the magnetometer is mirrored cannot be told: the dip is too "
                                                  "small, or gravity was not seen."
@@ -353,6 +395,8 @@ void MagnetometerAlignmentOptions::check() const {
   require_positive("norm_tolerance", norm_tolerance);
   require_positive("force_tolerance", force_tolerance);
   require(std::isfinite(gap_periods) && gap_periods > 1, "gap_periods", gap_periods, "must be above 1");
+  require_not_negative("gyroscope_matrix_sigma", gyroscope_matrix_sigma);
+  require_not_negative("field_sigma", field_sigma);
   require_not_negative("least_second_axis", least_second_axis);
   require_positive("ok_sigma", ok_sigma);
   require(std::isfinite(fair_sigma) && fair_sigma >= ok_sigma, "fair_sigma", fair_sigma, "must not be below ok_sigma");
@@ -389,6 +433,31 @@ Eigen::Vector4d alignment_residual(const FieldInterval& interval, const Eigen::Q
       (*jacobian)(3, 6) = 1;
     }
   }
+  return out;
+}
+
+Eigen::Matrix<double, 4, kCalibrationErrors> alignment_error_jacobian(const FieldInterval& interval,
+                                                                      const Eigen::Quaterniond& start,
+                                                                      const AlignmentVector& x) {
+  const Eigen::Matrix3d r = (start * so3::exp(x.head<3>())).toRotationMatrix();
+  const Eigen::Vector3d turn_error = interval.d_bias * x.segment<3>(3);
+  const Eigen::Matrix3d back = (interval.q_begin_end * so3::exp(turn_error)).conjugate().toRotationMatrix();
+  const Eigen::Matrix3d later_begin = Eigen::Matrix3d::Identity() - x[7] * so3::hat(interval.rate_begin);
+  const Eigen::Matrix3d later_end = Eigen::Matrix3d::Identity() - x[7] * so3::hat(interval.rate_end);
+  const Eigen::Vector3d carried = back * (later_begin * (r * interval.begin));
+  const auto by_field = [](const Eigen::Vector3d& m) {
+    Eigen::Matrix<double, 3, 9> d;
+    d << m.x(), 0, 0, 0, m.z(), m.y(), 1, 0, 0,  //
+        0, m.y(), 0, m.z(), 0, m.x(), 0, 1, 0,   //
+        0, 0, m.z(), m.y(), m.x(), 0, 0, 0, 1;
+    return d;
+  };
+  Eigen::Matrix<double, 4, kCalibrationErrors> out = Eigen::Matrix<double, 4, kCalibrationErrors>::Zero();
+  // A turn by the delay changes with G as well, by a hundredth of what is a hundredth already.
+  out.topLeftCorner<3, 9>() = -so3::hat(carried) * so3::right_jacobian(turn_error) * interval.d_matrix;
+  out.topRightCorner<3, 9>() =
+      later_end * r * by_field(interval.end) - back * later_begin * r * by_field(interval.begin);
+  if (interval.has_gravity) out.bottomRightCorner<1, 9>() = interval.up.transpose() * r * by_field(interval.field);
   return out;
 }
 
@@ -459,22 +528,29 @@ MagnetometerAlignment align_magnetometer(std::span<const TimeNs> times_ns, const
     }
     x[6] = quantile(sines, 0.5);
   }
+  CalibrationErrors errors = CalibrationErrors::Zero();
   LeastSquaresResult result;
   Weights w;
+  Problem problem(intervals, r, x, options);
   for (int round = 0; round < 8; ++round) {
-    w = weights_at(intervals, r, x);
-    result = refine(intervals, r, w, x);
+    w = weights_at(problem, x, errors);
+    Eigen::VectorXd all(x.size() + errors.size());
+    all << x, errors;
+    result = refine(problem, w, all);
     r = so3::boxplus(r, result.x.head<3>());
     const double step = result.x.head<3>().norm();
-    x = result.x;
+    x = result.x.head<8>();
     x.head<3>().setZero();
+    errors = result.x.tail<kCalibrationErrors>();
+    if (!result.x.allFinite()) break;
+    problem = Problem(intervals, r, x, options);
     if (step < 1e-9) break;
   }
   auto cov = covariance_from(result.information);
-  if (!cov || !x.allFinite()) {
+  if (!cov || !result.x.allFinite()) {
     return refuse("The turning does not determine the rotation: turn the device about all axes.");
   }
-  cov = cautious_covariance(intervals, r, x, w, *cov);
+  cov = cautious_covariance(problem, x, errors, w, *cov);
 
   out.solved = true;
   out.matrix = r.toRotationMatrix();
@@ -488,7 +564,7 @@ MagnetometerAlignment align_magnetometer(std::span<const TimeNs> times_ns, const
   std::vector<double> dips;
   for (std::size_t k = 0; k < intervals.size(); ++k) {
     if (w.turn[static_cast<Eigen::Index>(k)] > 0) {
-      sizes.push_back(alignment_residual(intervals[k], r, x, nullptr).head<3>().norm());
+      sizes.push_back(problem.residual(k, x, errors).head<3>().norm());
     }
     if (intervals[k].has_gravity) {
       dips.push_back(std::asin(std::clamp(-intervals[k].up.dot(r * intervals[k].field.normalized()), -1.0, 1.0)));

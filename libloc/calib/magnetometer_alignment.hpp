@@ -10,8 +10,11 @@
 //      by some milliseconds, which a fast turn shows as an angle: the delay is estimated too.
 //   2. Its angle to gravity, the dip, stays the same: u . R m = -sin(dip) where the accelerometer shows gravity u
 //   alone.
+// What is left of the errors of both calibrations (scale and misalignment of the gyroscope, a symmetric matrix and the
+// centre of the field) turns R, by about as much as it is large: both are estimated too, with what is known of them
+// beforehand, so that the covariance holds what the recording does not determine.
 // Start: constraint 1 is linear in R (the smallest singular vector of all intervals). Then Levenberg-Marquardt with
-// Tukey's loss on R, the gyroscope's remaining bias, the dip and the delay.
+// Tukey's loss on R, the gyroscope's remaining bias, the dip, the delay and those errors.
 //
 // Not observable: constraint 1 and 2 hold for -R as well as for R, with the field reversed. A mirrored (left-handed)
 // magnetometer therefore looks like a right-handed one in a reversed field; only the sign of the dip tells them apart:
@@ -34,11 +37,14 @@
 namespace loc {
 
 struct MagnetometerAlignmentOptions {
-  double interval_s = 0.25;        ///< over which the gyroscope carries the field
-  double expected_dip = kUnknown;  ///< [rad], positive where the field points down; NaN: mirroring is not checked
-  double norm_tolerance = 0.2;     ///< of the field's length to its median; beyond, a reading is disturbed
-  double force_tolerance = 0.03;   ///< of the specific force to its median where it is taken as gravity
-  double gap_periods = 5;          ///< a longer pause between samples ends an interval
+  double interval_s = 0.25;              ///< over which the gyroscope carries the field
+  double expected_dip = kUnknown;        ///< [rad], positive where the field points down; NaN: mirroring is not checked
+  double norm_tolerance = 0.2;           ///< of the field's length to its median; beyond, a reading is disturbed
+  double force_tolerance = 0.03;         ///< of the specific force to its median where it is taken as gravity
+  double gap_periods = 5;                ///< a longer pause between samples ends an interval
+  double gyroscope_matrix_sigma = 0.01;  ///< of each entry of what is left of scale and misalignment; calibrated: 0.001
+  double field_sigma = 0.005;      ///< of what is left of the magnetometer's matrix (symmetric; beside the diagonal
+                                   ///< 1 / sqrt(2) of it) and of its centre over the field
   double least_second_axis = 0.1;  ///< of the turning: about a second axis, relative to the first; below: refused
   double ok_sigma =
       0.5 * std::numbers::pi / 180;  ///< [rad] predicted deviation of R, worst direction: up to here ok, …
@@ -90,9 +96,11 @@ TriadCalibration aligned(const TriadCalibration& magnetometer, const Magnetomete
 
 /// One interval between two readings of the field, for align_magnetometer and its test.
 struct FieldInterval {
-  Eigen::Quaterniond q_begin_end = Eigen::Quaterniond::Identity();  ///< by the gyroscope
-  Eigen::Matrix3d d_bias = Eigen::Matrix3d::Zero();                 ///< its right perturbation by the bias
-  Eigen::Vector3d begin = Eigen::Vector3d::Zero();                  ///< field, length near 1, magnetometer axes
+  Eigen::Quaterniond q_begin_end = Eigen::Quaterniond::Identity();             ///< by the gyroscope
+  Eigen::Matrix3d d_bias = Eigen::Matrix3d::Zero();                            ///< its right perturbation by the bias
+  Eigen::Matrix<double, 3, 9> d_matrix = Eigen::Matrix<double, 3, 9>::Zero();  ///< the same by G, the true rate being
+                                                                               ///< (I + G) times the measured one
+  Eigen::Vector3d begin = Eigen::Vector3d::Zero();  ///< field, length near 1, magnetometer axes
   Eigen::Vector3d end = Eigen::Vector3d::Zero();
   Eigen::Vector3d rate_begin = Eigen::Vector3d::Zero();  ///< [rad/s]
   Eigen::Vector3d rate_end = Eigen::Vector3d::Zero();
@@ -107,5 +115,14 @@ using AlignmentVector = Eigen::Matrix<double, 8, 1>;
 /// Both constraints at x: three values, and one (0 without gravity). The Jacobian may be null.
 Eigen::Vector4d alignment_residual(const FieldInterval& interval, const Eigen::Quaterniond& start,
                                    const AlignmentVector& x, Eigen::Matrix<double, 4, 8>* jacobian);
+
+/// What is left of the errors of the calibrations: G of the gyroscope column by column, symmetric S (xx yy zz yz xz xy)
+/// and centre c of the field, m -> (I + S) m + c with m of length 1.
+constexpr int kCalibrationErrors = 18;
+
+/// Derivative of alignment_residual() by them, at zero.
+Eigen::Matrix<double, 4, kCalibrationErrors> alignment_error_jacobian(const FieldInterval& interval,
+                                                                      const Eigen::Quaterniond& start,
+                                                                      const AlignmentVector& x);
 
 }  // namespace loc

@@ -445,12 +445,15 @@ void bind_alignment_options(py::module_& m) {
   const Options d;
   py::class_<Options>(m, "MagnetometerAlignmentOptions", "How the magnetometer is aligned, and where verdicts change.")
       .def(py::init([](double interval_s, double expected_dip, double norm_tolerance, double force_tolerance,
-                       double gap_periods, double least_second_axis, double ok, double fair, double warn) {
+                       double gap_periods, double gyroscope_matrix_sigma, double field_sigma, double least_second_axis,
+                       double ok, double fair, double warn) {
              const Options options{.interval_s = interval_s,
                                    .expected_dip = expected_dip,
                                    .norm_tolerance = norm_tolerance,
                                    .force_tolerance = force_tolerance,
                                    .gap_periods = gap_periods,
+                                   .gyroscope_matrix_sigma = gyroscope_matrix_sigma,
+                                   .field_sigma = field_sigma,
                                    .least_second_axis = least_second_axis,
                                    .ok_sigma = ok,
                                    .fair_sigma = fair,
@@ -460,7 +463,8 @@ void bind_alignment_options(py::module_& m) {
            }),
            py::kw_only(), py::arg("interval_s") = d.interval_s, py::arg("expected_dip") = d.expected_dip,
            py::arg("norm_tolerance") = d.norm_tolerance, py::arg("force_tolerance") = d.force_tolerance,
-           py::arg("gap_periods") = d.gap_periods, py::arg("least_second_axis") = d.least_second_axis,
+           py::arg("gap_periods") = d.gap_periods, py::arg("gyroscope_matrix_sigma") = d.gyroscope_matrix_sigma,
+           py::arg("field_sigma") = d.field_sigma, py::arg("least_second_axis") = d.least_second_axis,
            py::arg("ok_sigma") = d.ok_sigma, py::arg("fair_sigma") = d.fair_sigma, py::arg("warn_sigma") = d.warn_sigma,
            "ValueError names a field that is out of range.")
       .def_readonly("interval_s", &Options::interval_s, "over which the gyroscope carries the field")
@@ -468,6 +472,10 @@ void bind_alignment_options(py::module_& m) {
       .def_readonly("norm_tolerance", &Options::norm_tolerance, "of the field's length, relative")
       .def_readonly("force_tolerance", &Options::force_tolerance, "of the specific force taken as gravity, relative")
       .def_readonly("gap_periods", &Options::gap_periods, "a longer pause ends an interval")
+      .def_readonly("gyroscope_matrix_sigma", &Options::gyroscope_matrix_sigma,
+                    "of each entry of what is left of the gyroscope's scale and misalignment")
+      .def_readonly("field_sigma", &Options::field_sigma,
+                    "of each entry of what is left of the magnetometer's matrix and, over the field, of its centre")
       .def_readonly("least_second_axis", &Options::least_second_axis, "turning about a second axis over the first")
       .def_readonly("ok_sigma", &Options::ok_sigma, "[rad] predicted deviation that is ok")
       .def_readonly("fair_sigma", &Options::fair_sigma, "… fair")

@@ -80,7 +80,8 @@ TEST(MagnetometerAlignment, AnyRotationWithinItsSigma) {
   for (std::uint64_t seed = 1; seed <= 25; ++seed) {
     Random random(seed + 1000);
     const Eigen::Matrix3d turn = random.rotation().toRotationMatrix();
-    const MagnetometerAlignment a = align(recording(seed, turn), {.expected_dip = kDip});
+    const MagnetometerAlignment a =
+        align(recording(seed, turn), {.expected_dip = kDip, .gyroscope_matrix_sigma = 0, .field_sigma = 0});
     ASSERT_TRUE(a.solved);
     EXPECT_FALSE(a.mirrored) << seed;
     const Eigen::Vector3d e = error_of(a, turn);
@@ -98,26 +99,102 @@ TEST(MagnetometerAlignment, AnyRotationWithinItsSigma) {
   EXPECT_LT(mean(nees), 4.5);
 }
 
+TEST(MagnetometerAlignment, JacobianByTheErrorsOfTheCalibrations) {
+  Random random(12);
+  FieldInterval k;
+  k.q_begin_end = so3::exp(0.5 * random.normal3());
+  k.begin = random.direction();
+  k.end = random.direction();
+  k.field = random.direction();
+  k.up = random.direction();
+  k.rate_begin = random.normal3();
+  k.rate_end = random.normal3();
+  k.has_gravity = true;
+  for (int column = 0; column < 9; ++column) k.d_matrix.col(column) = random.normal3();
+  const Eigen::Quaterniond start = random.rotation();
+  AlignmentVector x;
+  x << 0.2 * random.normal3(), 0.2 * random.normal3(), 0.5, 0.02;
+  using Errors = Eigen::Matrix<double, kCalibrationErrors, 1>;
+  const auto f = [&](const Errors& e) {
+    FieldInterval other = k;
+    other.q_begin_end = k.q_begin_end * so3::exp(k.d_matrix * e.head<9>());
+    Eigen::Matrix3d s;
+    s << e[9], e[14], e[13], e[14], e[10], e[12], e[13], e[12], e[11];
+    for (Eigen::Vector3d* m : {&other.begin, &other.end, &other.field}) *m = *m + s * *m + e.tail<3>();
+    return alignment_residual(other, start, x, nullptr);
+  };
+  EXPECT_TRUE(
+      test::near(alignment_error_jacobian(k, start, x), test::numeric_jacobian(f, Errors(Errors::Zero())), 1e-8));
+}
+
+/// Errors of the calibrations drawn as the options say: the told covariance holds, and the fit removes a part.
+TEST(MagnetometerAlignment, ErrorsOfTheCalibrationsAreTold) {
+  struct Case {
+    double gyroscope;
+    double field;
+  };
+  for (const Case& c : {Case{.gyroscope = 0.01, .field = 0.005}, Case{.gyroscope = 0.01, .field = 0.0},
+                        Case{.gyroscope = 0.001, .field = 0.02}}) {
+    std::vector<double> nees;
+    std::vector<double> unaware;
+    std::vector<double> errors;
+    std::vector<double> sigmas;
+    for (std::uint64_t seed = 1; seed <= 25; ++seed) {
+      Random random(seed + 3000);
+      const Eigen::Matrix3d turn = random.rotation().toRotationMatrix();
+      Recording r = recording(seed, turn);
+      Eigen::Matrix3d g;
+      for (int k = 0; k < 3; ++k) g.col(k) = c.gyroscope * random.normal3();
+      const Eigen::Vector3d diagonal = c.field * random.normal3();
+      const Eigen::Vector3d off = c.field / std::numbers::sqrt2 * random.normal3();
+      Eigen::Matrix3d s;
+      s << diagonal.x(), off.z(), off.y(), off.z(), diagonal.y(), off.x(), off.y(), off.x(), diagonal.z();
+      const Eigen::RowVector3d centre = c.field * r.body.field.norm() * random.normal3().transpose();
+      r.body.gyroscope = (r.body.gyroscope * (Eigen::Matrix3d::Identity() + g).inverse().transpose()).eval();
+      r.magnetometer = (r.magnetometer * (Eigen::Matrix3d::Identity() + s)).eval();
+      r.magnetometer.rowwise() += centre;
+      const auto run = [&](double gyroscope, double field) {
+        return align(r, {.expected_dip = kDip, .gyroscope_matrix_sigma = gyroscope, .field_sigma = field});
+      };
+      const MagnetometerAlignment a = run(c.gyroscope, c.field);
+      ASSERT_TRUE(a.solved);
+      const Eigen::Vector3d e = error_of(a, turn);
+      nees.push_back(e.dot(a.cov.ldlt().solve(e)) / 3);
+      errors.push_back(e.norm());
+      sigmas.push_back(a.sigma);
+      unaware.push_back(error_of(run(0, 0), turn).norm());
+    }
+    std::printf("gyroscope %.3f field %.3f: NEES/3 %.2f, error %.3f deg, not estimated %.3f, sigma %.3f\n", c.gyroscope,
+                c.field, mean(nees), quantile(errors, 0.5) / kDegree, quantile(unaware, 0.5) / kDegree,
+                quantile(sigmas, 0.5) / kDegree);
+    // On the safe side, as above.
+    EXPECT_GT(mean(nees), 0.3);
+    EXPECT_LT(mean(nees), 2);
+    EXPECT_LT(quantile(errors, 0.5), quantile(unaware, 0.5));
+  }
+}
+
 /// The device never rests; gravity alone is seen in few intervals only.
 TEST(MagnetometerAlignment, FewReadingsOfGravityDoNotDecide) {
   int tried = 0;
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 25; ++seed) {
     Random random(seed + 500);
     const Eigen::Matrix3d turn = random.rotation().toRotationMatrix();
     Recording r = recording(seed, turn);
     const Rows force = r.body.accelerometer;
-    r.body.accelerometer *= 1.2;
     // Three intervals in the first rest show gravity, with one common error of 1.5 degrees.
     const Eigen::Matrix3d wrong = so3::exp(1.5 * kDegree * random.direction()).toRotationMatrix();
-    for (Eigen::Index i = 0; i < 76; ++i) r.body.accelerometer.row(i) = 1.2 * (wrong * force.row(i).transpose());
-    for (Eigen::Index i = 76; i < force.rows(); ++i) r.body.accelerometer(i, 0) += i % 2 == 0 ? 3 : -3;
+    for (Eigen::Index i = 0; i < 76; ++i) r.body.accelerometer.row(i) = (wrong * force.row(i).transpose()).transpose();
+    for (Eigen::Index i = 76; i < force.rows(); ++i) {
+      r.body.accelerometer.row(i) *= 1 + 0.2 * static_cast<double>(i % 3 - 1);
+    }
     const MagnetometerAlignment a = align(r, {.expected_dip = kDip});
     if (a.gravity_readings < 1 || a.gravity_readings > 9) continue;
     ++tried;
     ASSERT_TRUE(a.solved);
     const Eigen::Vector3d e = error_of(a, turn);
     EXPECT_LT(e.dot(a.cov.ldlt().solve(e)), 20) << seed;
-    EXPECT_LT(e.norm(), 0.4 * kDegree) << seed;
+    EXPECT_LT(e.norm(), 0.7 * kDegree) << seed;
     EXPECT_GT(a.dip_sigma, 0.5 * kDegree);
   }
   EXPECT_GE(tried, 5);
@@ -248,6 +325,8 @@ TEST(MagnetometerAlignment, HostileInput) {
   EXPECT_THROW(align_magnetometer(r.body.times_ns, r.body.gyroscope, kAbsent, kAbsent), std::invalid_argument);
   EXPECT_THROW(align(r, {.interval_s = 0}), std::invalid_argument);
   EXPECT_THROW(align(r, {.expected_dip = 2}), std::invalid_argument);
+  EXPECT_THROW(align(r, {.gyroscope_matrix_sigma = -1}), std::invalid_argument);
+  EXPECT_THROW(align(r, {.field_sigma = std::nan("")}), std::invalid_argument);
   EXPECT_THROW(aligned({}, {}), DataError);
 }
 
@@ -294,7 +373,7 @@ TEST(MagnetometerAlignmentReal, Broad) {
     const Rows turned = trial.magnetic_field * turn.transpose();
     const auto run = [&](const Rows& field) {
       return align_magnetometer(trial.time_ns, trial.angular_velocity, trial.specific_force, field,
-                                {.expected_dip = 1.15});
+                                {.expected_dip = 1.15, .gyroscope_matrix_sigma = 0.001});
     };
     const MagnetometerAlignment as_is = run(trial.magnetic_field);
     const MagnetometerAlignment known = run(turned);
