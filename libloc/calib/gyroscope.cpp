@@ -437,7 +437,9 @@ GyroscopeFit fit_gyroscope(std::span<const TimeNs> times_ns, const TriadRows& gy
     return s.samples > 1 && s.gyroscope.mean.allFinite() && s.gyroscope.cov.allFinite() &&
            s.accelerometer.mean.allFinite() && s.accelerometer.cov.allFinite();
   });
-  if (!accelerometer.solved) return bias_only("The accelerometer is not calibrated.");
+  if (!accelerometer.solved)
+    return bias_only(
+        "The accelerometer could not be calibrated from this recording, which scale and misalignment need.");
   if (!usable) return bias_only("Some segments lack one of the two sensors.");
 
   double rest_s = 0;
