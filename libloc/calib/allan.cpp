@@ -203,34 +203,58 @@ AllanTerm term_of(Term term, const TermFit& fit, std::span<const AllanPoint> poi
   return out;
 }
 
-void judge(AllanFit& fit) {
-  const std::string duration = to_text(std::round(fit.duration_s)) + " s of recording";
-  if (!fit.noise_density.identified) {
-    fit.quality.lower_to(Verdict::kWarn, "The noise density is not visible in " + duration +
-                                             ": no part of the curve falls as white noise does.");
+/// Of one axis, or of the three of a sensor: axes with the same lack share one sentence.
+void judge(std::span<const AllanFit> fits, const std::string& sensor, Quality& quality) {
+  const auto lower = [&](Verdict verdict, const auto& is, const std::string& reason) {
+    std::string axes;
+    for (std::size_t k = 0; k < fits.size(); ++k) {
+      if (is(fits[k])) axes += std::string(" ") + "xyz"[k];
+    }
+    if (!axes.empty()) quality.lower_to(verdict, sensor.empty() ? reason : sensor + axes + ": " + reason);
+  };
+  std::vector<std::string> refused;
+  double duration_s = 0;
+  for (const AllanFit& fit : fits) {
+    duration_s = fit.duration_s;
+    if (fit.quality.usable()) continue;
+    for (const std::string& reason : fit.quality.reasons) {
+      if (std::find(refused.begin(), refused.end(), reason) == refused.end()) refused.push_back(reason);
+    }
   }
-  if (!fit.bias_instability.identified) {
-    fit.quality.lower_to(Verdict::kFair, "The bias instability is not visible in " + duration + ", it is at most " +
-                                             to_text(fit.bias_instability.upper_bound, 3) +
-                                             ": the curve has no floor of its own. Record longer.");
+  for (const std::string& reason : refused) {
+    lower(
+        Verdict::kRefused,
+        [&](const AllanFit& fit) {
+          return !fit.quality.usable() &&
+                 std::find(fit.quality.reasons.begin(), fit.quality.reasons.end(), reason) != fit.quality.reasons.end();
+        },
+        reason);
   }
-  if (!fit.random_walk.identified) {
-    fit.quality.lower_to(Verdict::kFair,
-                         "The random walk of the bias is not visible in " + duration + ", it is at most " +
-                             to_text(fit.random_walk.upper_bound, 3) +
-                             ": the curve does not rise at its end. Record longer, hours rather than minutes.");
-  }
-  if (fit.misfit > 3) {
-    fit.quality.lower_to(Verdict::kWarn, "The curve is not a sum of the usual terms (misfit " +
-                                             to_text(std::round(fit.misfit * 10) / 10) +
-                                             " deviations): vibration, or a filter in the sensor.");
-  }
-}
-
-void take_worst(const AllanFit& fit, const char* sensor, int axis, Quality& quality) {
-  for (const std::string& reason : fit.quality.reasons) {
-    quality.lower_to(fit.quality.verdict, std::string(sensor) + " " + "xyz"[axis] + ": " + reason);
-  }
+  const auto unseen = [](AllanTerm AllanFit::*term) {
+    return [term](const AllanFit& fit) { return fit.quality.usable() && !(fit.*term).identified; };
+  };
+  const auto at_most = [&](AllanTerm AllanFit::*term) {
+    double bound = 0;
+    for (const AllanFit& fit : fits) {
+      if (unseen(term)(fit)) bound = std::max(bound, (fit.*term).upper_bound);
+    }
+    return ", it is at most " + to_text(bound, 3);
+  };
+  const std::string duration = to_text(std::round(duration_s)) + " s of recording";
+  lower(Verdict::kWarn, unseen(&AllanFit::noise_density),
+        "The noise density is not visible in " + duration + ": no part of the curve falls as white noise does.");
+  lower(Verdict::kFair, unseen(&AllanFit::bias_instability),
+        "The bias instability is not visible in " + duration + at_most(&AllanFit::bias_instability) +
+            ": the curve has no floor of its own. Record longer.");
+  lower(Verdict::kFair, unseen(&AllanFit::random_walk),
+        "The random walk of the bias is not visible in " + duration + at_most(&AllanFit::random_walk) +
+            ": the curve does not rise at its end. Record longer, hours rather than minutes.");
+  double misfit = 0;
+  for (const AllanFit& fit : fits) misfit = std::max(misfit, std::isfinite(fit.misfit) ? fit.misfit : 0);
+  lower(
+      Verdict::kWarn, [](const AllanFit& fit) { return fit.misfit > 3; },
+      "The curve is not a sum of the usual terms (misfit " + to_text(std::round(misfit * 10) / 10) +
+          " deviations): vibration, or a filter in the sensor.");
 }
 
 }  // namespace
@@ -290,15 +314,84 @@ AllanFit allan_fit(std::span<const double> values, double rate_hz, const AllanOp
   fit.noise_density = term_of(kNoise, terms, fitted, kMain);
   fit.bias_instability = term_of(kBias, terms, fitted, kFloor);
   fit.random_walk = term_of(kWalk, terms, fitted, kMain);
-  judge(fit);
+  Quality quality;
+  judge(std::span(&fit, 1), "", quality);
+  fit.quality = quality;
   return fit;
 }
+
+namespace {
+
+constexpr int kLongestBridge = 4;      // samples: more that are lost in one place end the part
+constexpr double kMuchBridged = 0.01;  // of the samples
+constexpr double kLeastShare = 0.1;    // of the recording, without a warning
+constexpr double kLeastDuration = 60;  // [s]
+
+/// The usable rows of a part, and how many samples were lost before each of them.
+struct SteadyRows {
+  std::vector<Eigen::Index> rows;
+  std::vector<int> lost_before;
+  std::int64_t bridged = 0;
+
+  std::vector<double> values(const TriadRows& data, int axis) const {
+    std::vector<double> out;
+    out.reserve(rows.size() + static_cast<std::size_t>(bridged));
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      const double value = data(rows[k], axis);
+      for (int i = 1; i <= lost_before[k]; ++i) {
+        const double before = data(rows[k - 1], axis);
+        out.push_back(before + (value - before) * i / (lost_before[k] + 1));
+      }
+      out.push_back(value);
+    }
+    return out;
+  }
+};
+
+/// A late time stamp is made up for by the next ones, a lost sample is not: the steps until some rows later tell.
+SteadyRows steady_rows(std::span<const TimeNs> times_ns, const TriadRows& gyroscope, const TriadRows& accelerometer,
+                       const StillSegment& part) {
+  SteadyRows out;
+  std::vector<TimeNs> times;
+  for (auto row = part.begin; row < part.end; ++row) {
+    const TimeNs t = times_ns[static_cast<std::size_t>(row)];
+    const bool finite = (gyroscope.rows() == 0 || gyroscope.row(row).allFinite()) &&
+                        (accelerometer.rows() == 0 || accelerometer.row(row).allFinite());
+    if (!finite || t == kNoTime || (!times.empty() && t <= times.back())) continue;
+    times.push_back(t);
+    out.rows.push_back(row);
+  }
+  out.lost_before.assign(times.size(), 0);
+  // Over many steps, as single ones may have the resolution of a coarse clock.
+  constexpr std::size_t kMany = 50;
+  const std::size_t reach = std::min(kMany, times.size() - 1);
+  std::vector<double> periods;
+  for (std::size_t k = 0; k + reach < times.size(); ++k) {
+    periods.push_back(elapsed_s(times[k], times[k + reach]) / static_cast<double>(reach));
+  }
+  if (reach == 0) return out;
+  const double period = quantile(periods, 0.5);
+  constexpr std::size_t kAhead = 4;
+  for (std::size_t k = 1; k < times.size(); ++k) {
+    if (elapsed_s(times[k - 1], times[k]) <= 1.5 * period) continue;
+    // The least that any later row leaves: further losses ahead must not be counted here.
+    int lost = kLongestBridge;
+    for (std::size_t j = k; j < std::min(times.size(), k + kAhead + 1); ++j) {
+      const double periods_passed = elapsed_s(times[k - 1], times[j]) / period;
+      lost = std::min(lost, static_cast<int>(std::lround(periods_passed)) - static_cast<int>(j - k + 1));
+    }
+    out.lost_before[k] = std::max(0, lost);
+    out.bridged += out.lost_before[k];
+  }
+  return out;
+}
+
+}  // namespace
 
 ImuAllan analyse_imu_noise(std::span<const TimeNs> times_ns, const TriadRows& gyroscope, const TriadRows& accelerometer,
                            const AllanOptions& options, StillnessOptions stillness) {
   options.check();
-  constexpr double kGap = 1.5;
-  stillness.gap_periods = std::min(stillness.gap_periods, kGap);
+  stillness.gap_periods = std::min(stillness.gap_periods, kLongestBridge + 1.5);
   const Stillness still = find_stillness(times_ns, gyroscope, accelerometer, stillness);
   ImuAllan out;
   out.quality = still.quality;
@@ -317,22 +410,26 @@ ImuAllan analyse_imu_noise(std::span<const TimeNs> times_ns, const TriadRows& gy
                                              " still parts, " + std::to_string(still.gaps) + " gaps, " +
                                              std::to_string(still.not_finite + still.out_of_order) + " bad rows.");
   }
+  if (out.used_share < kLeastShare || out.duration_s < kLeastDuration) {
+    out.quality.lower_to(Verdict::kWarn, "Only " + to_text(std::round(out.duration_s * 10) / 10) + " s were used, " +
+                                             to_text(std::round(out.used_share * 1000) / 10) +
+                                             " % of the recording: let the device lie still, without lost samples.");
+  }
+  const SteadyRows steady = steady_rows(times_ns, gyroscope, accelerometer, longest);
+  out.bridged = steady.bridged;
+  const auto count = static_cast<std::int64_t>(steady.rows.size()) + steady.bridged;
+  if (static_cast<double>(out.bridged) > kMuchBridged * static_cast<double>(count)) {
+    out.quality.lower_to(Verdict::kFair, std::to_string(out.bridged) + " of " + std::to_string(count) +
+                                             " samples are lost or not finite and were interpolated: the noise comes "
+                                             "out a little too small.");
+  }
   // Mean rate over the part: the median period has the resolution of the time stamps.
-  const double rate_hz = static_cast<double>(longest.samples - 1) / longest.duration_s();
+  const double rate_hz = static_cast<double>(count - 1) / longest.duration_s();
   const auto analyse = [&](const TriadRows& rows, const char* name, std::array<AllanFit, 3>& fits) {
     for (int axis = 0; axis < 3; ++axis) {
-      std::vector<double> values;
-      for (auto row = longest.begin; row < longest.end; ++row) {
-        // A row that is left out between two others of the part can only repeat a time.
-        if (row > longest.begin &&
-            times_ns[static_cast<std::size_t>(row)] <= times_ns[static_cast<std::size_t>(row - 1)]) {
-          continue;
-        }
-        if (std::isfinite(rows(row, axis))) values.push_back(rows(row, axis));
-      }
-      fits[static_cast<std::size_t>(axis)] = allan_fit(values, rate_hz, options);
-      take_worst(fits[static_cast<std::size_t>(axis)], name, axis, out.quality);
+      fits[static_cast<std::size_t>(axis)] = allan_fit(steady.values(rows, axis), rate_hz, options);
     }
+    judge(fits, name, out.quality);
   };
   out.has_gyroscope = gyroscope.rows() > 0;
   out.has_accelerometer = accelerometer.rows() > 0;

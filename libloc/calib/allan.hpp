@@ -76,11 +76,13 @@ struct ImuAllan {
   std::int64_t begin = 0;  ///< rows used
   std::int64_t end = 0;
   double duration_s = 0;
-  double used_share = 0;  ///< of the rows given
-  Quality quality;        ///< of the choice of the part, and the worst of the axes
+  double used_share = 0;     ///< of the rows given
+  std::int64_t bridged = 0;  ///< samples lost or not finite, up to 4 in one place, and interpolated
+  Quality quality;           ///< of the choice of the part, and the worst of the axes
 };
 
-/// @param gyroscope [rad/s], accelerometer [m/s^2]: N rows, or none. A pause of more than 1.5 periods is a gap.
+/// @param gyroscope [rad/s], accelerometer [m/s^2]: N rows, or none. Up to 4 samples lost in one place are interpolated
+/// and counted, a longer pause is a gap; single late time stamps do no harm.
 /// @throws std::invalid_argument for wrong options or sizes.
 ImuAllan analyse_imu_noise(std::span<const TimeNs> times_ns, const TriadRows& gyroscope, const TriadRows& accelerometer,
                            const AllanOptions& options = {}, StillnessOptions stillness = {});

@@ -414,6 +414,7 @@ void bind_allan(py::module_& m) {
       .def_readonly("end", &ImuAllan::end)
       .def_readonly("duration_s", &ImuAllan::duration_s)
       .def_readonly("used_share", &ImuAllan::used_share)
+      .def_readonly("bridged", &ImuAllan::bridged, "samples that were lost or not finite, and interpolated")
       .def_readonly("quality", &ImuAllan::quality);
   m.def(
       "analyse_imu_noise",
