@@ -290,40 +290,6 @@ TEST(ImuAllan, ShortPartsWarnAndAxesShareASentence) {
   EXPECT_EQ(walks, 1);
 }
 
-TEST(ImuAllan, LostSamplesAndLateStampsAreBridged) {
-  Recording r = still_recording(60'000, 8);
-  const ImuAllan whole = analyse_imu_noise(r.times, r.gyro, r.accel);
-  EXPECT_EQ(whole.bridged, 0);
-  Recording bad;
-  std::vector<Eigen::Index> kept;
-  for (Eigen::Index i = 0; i < r.gyro.rows(); ++i) {
-    if (i % 1000 == 500 || i % 5000 == 501) continue;  // one, sometimes two lost
-    kept.push_back(i);
-    bad.times.push_back(r.times[static_cast<std::size_t>(i)] + (i % 700 == 0 ? 8'000'000 : 0));  // late stamps
-  }
-  bad.gyro = r.gyro(kept, Eigen::all);
-  bad.accel = r.accel(kept, Eigen::all);
-  bad.gyro(30'000, 1) = std::nan("");
-  const ImuAllan allan = analyse_imu_noise(bad.times, bad.gyro, bad.accel);
-  EXPECT_EQ(allan.used_share, 1);
-  EXPECT_EQ(allan.bridged, 60 + 12 + 1);
-  EXPECT_NEAR(allan.gyroscope[0].rate_hz, 100, 1e-3);
-  EXPECT_NEAR(allan.gyroscope[2].noise_density.value / whole.gyroscope[2].noise_density.value, 1, 0.01);
-  EXPECT_EQ(allan.quality.verdict, whole.quality.verdict);
-}
-
-TEST(ImuAllan, ShortPartsWarnAndAxesShareASentence) {
-  const Recording r = still_recording(5'000, 9);
-  const ImuAllan allan = analyse_imu_noise(r.times, r.gyro, Rows(0, 3));
-  EXPECT_EQ(allan.quality.verdict, Verdict::kWarn);
-  EXPECT_NE(allan.quality.reasons.at(0).find("50 s"), std::string::npos);
-  int walks = 0;
-  for (const std::string& reason : allan.quality.reasons) {
-    if (reason.find("gyroscope x y z: The random walk") != std::string::npos) ++walks;
-  }
-  EXPECT_EQ(walks, 1);
-}
-
 // The first pose of the recording: 50 s of raw counts, too short for more than white noise.
 TEST(AllanReal, XsensFirstPose) {
   LOC_DATA_OR_SKIP(folder, "imu-tk-xsens");
