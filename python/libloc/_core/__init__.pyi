@@ -2367,6 +2367,11 @@ class ImuAllan:
         rows used
         """
     @property
+    def bridged(self) -> int:
+        """
+        samples that were lost or not finite, and interpolated
+        """
+    @property
     def duration_s(self) -> float:
         ...
     @property
@@ -2402,7 +2407,7 @@ class MagnetometerAlignmentOptions:
     """
     How the magnetometer is aligned, and where verdicts change.
     """
-    def __init__(self, *, interval_s: typing.SupportsFloat | typing.SupportsIndex = 0.25, expected_dip: typing.SupportsFloat | typing.SupportsIndex = ..., norm_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.2, force_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.03, gap_periods: typing.SupportsFloat | typing.SupportsIndex = 5.0, least_second_axis: typing.SupportsFloat | typing.SupportsIndex = 0.1, ok_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.008726646259971648, fair_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.017453292519943295, warn_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.05235987755982988) -> None:
+    def __init__(self, *, interval_s: typing.SupportsFloat | typing.SupportsIndex = 0.25, expected_dip: typing.SupportsFloat | typing.SupportsIndex = ..., norm_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.2, force_tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.03, gap_periods: typing.SupportsFloat | typing.SupportsIndex = 5.0, gyroscope_matrix_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.01, field_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.005, least_second_axis: typing.SupportsFloat | typing.SupportsIndex = 0.1, ok_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.008726646259971648, fair_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.017453292519943295, warn_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.05235987755982988) -> None:
         """
         ValueError names a field that is out of range.
         """
@@ -2417,6 +2422,11 @@ class MagnetometerAlignmentOptions:
         … fair
         """
     @property
+    def field_sigma(self) -> float:
+        """
+        of each entry of what is left of the magnetometer's matrix and, over the field, of its centre
+        """
+    @property
     def force_tolerance(self) -> float:
         """
         of the specific force taken as gravity, relative
@@ -2425,6 +2435,11 @@ class MagnetometerAlignmentOptions:
     def gap_periods(self) -> float:
         """
         a longer pause ends an interval
+        """
+    @property
+    def gyroscope_matrix_sigma(self) -> float:
+        """
+        of each entry of what is left of the gyroscope's scale and misalignment
         """
     @property
     def interval_s(self) -> float:
@@ -3066,7 +3081,7 @@ def error_statistics(errors: numpy.typing.NDArray[numpy.float64]) -> ErrorStatis
     """
     Of float64 errors (N,). ValueError when empty or not finite.
     """
-def estimate_time_offset(times_ns: numpy.typing.NDArray[numpy.int64], positions: numpy.typing.NDArray[numpy.float64], reference_times_ns: numpy.typing.NDArray[numpy.int64], reference_positions: numpy.typing.NDArray[numpy.float64], *, reference_velocities: typing.Any = None, reference_q_world_body_wxyz: typing.Any = None, max_offset_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, horizontal: bool = True, max_reference_gap_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, estimate_bias: bool = False, estimate_lever_arm: bool = False, lever_arm: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), correlation_s: typing.SupportsFloat | typing.SupportsIndex = 120.0) -> TimeOffsetResult:
+def estimate_time_offset(times_ns: numpy.typing.NDArray[numpy.int64], positions: numpy.typing.NDArray[numpy.float64], reference_times_ns: numpy.typing.NDArray[numpy.int64], reference_positions: numpy.typing.NDArray[numpy.float64], *, reference_velocities: typing.Any = None, reference_q_world_body_wxyz: typing.Any = None, max_offset_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, horizontal: bool = True, max_reference_gap_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, estimate_bias: bool = False, estimate_lever_arm: bool = False, lever_arm: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), correlation_s: typing.SupportsFloat | typing.SupportsIndex = 120.0, bias_sigma_m: typing.SupportsFloat | typing.SupportsIndex = 1.5) -> TimeOffsetResult:
     """
     By how much the stamps of a position stream are off against a reference trajectory in the same world (z up): t_reference = t_stream + offset_s. int64 (N,), float64 (N, 3) [m]; NaN rows are skipped. DataError names the index where times do not increase.
     """
@@ -3152,7 +3167,7 @@ def orientation_error(estimate_wxyz: numpy.typing.NDArray[numpy.float64], refere
     """
 def parse_nmea(data: bytes, *, reference_date: typing.Any | None = None, leap_seconds: typing.SupportsInt | typing.SupportsIndex | None = None, geoid_separation: typing.SupportsFloat | typing.SupportsIndex | None = None, sigma_per_dop: typing.SupportsFloat | typing.SupportsIndex = 0.0, accept_not_measured: bool = False) -> NmeaFixes:
     """
-    Fixes in the bytes of a receiver; anything may stand between the sentences. reference_date: a datetime.date within 10 years of the data, which resolves two-digit years and mends the dates of receivers that are past their 1024 weeks. leap_seconds: GPS minus UTC instead of the library's table. geoid_separation [m]: where the receiver does not say it. sigma_per_dop [m]: covariance for fixes without GST; 0: NaN. accept_not_measured: dead-reckoned, manual and simulator positions count as fixes.
+    Fixes in the bytes of a receiver; anything may stand between the sentences. reference_date: a datetime.date at or after the data by less than 19 years, which resolves two-digit years and mends the dates of receivers that are past their 1024 weeks. leap_seconds: GPS minus UTC instead of the library's table. geoid_separation [m]: where the receiver does not say it. sigma_per_dop [m]: covariance for fixes without GST; 0: NaN. accept_not_measured: dead-reckoned, manual and simulator positions count as fixes.
     """
 def parse_seconds(text: str) -> int:
     """
