@@ -135,11 +135,15 @@ def drive(offset_s):
 
 def test_time_offset():
     times, positions, reference_ns, reference = drive(-0.2)
-    result = libloc.estimate_time_offset(times, positions, reference_ns, reference)
+    result = libloc.estimate_time_offset(times, positions, reference_ns, reference, bias_sigma_m=0)
     assert result.offset_s == pytest.approx(-0.2, abs=5 * result.sigma_s)
     assert result.sigma_s < 0.02 and result.converged
     assert result.rms_after_m < result.rms_before_m
     assert result.quality.usable
+    # A short drive in one direction: a constant error of the positions looks like an offset.
+    doubted = libloc.estimate_time_offset(times, positions, reference_ns, reference)
+    assert doubted.offset_s == result.offset_s
+    assert doubted.sigma_s > 3 * result.sigma_s
     with pytest.raises(DataError, match=r"reference: times_ns\[1\]"):
         libloc.estimate_time_offset(times, positions, reference_ns[::-1].copy(), reference)
     with pytest.raises(ValueError, match="reference_positions must have as many rows"):
