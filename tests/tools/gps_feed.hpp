@@ -20,6 +20,8 @@ class SerialCable {
  public:
   /// @param path of the symbolic link to the port
   explicit SerialCable(std::string path);
+  /// Whether this machine gives out pseudo-terminals: a bare chroot has no /dev/pts.
+  static bool available();
   SerialCable(const SerialCable&) = delete;
   SerialCable& operator=(const SerialCable&) = delete;
   ~SerialCable();
