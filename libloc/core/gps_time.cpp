@@ -238,8 +238,9 @@ UtcTime utc_from_gps(TimeNs gps_time_ns, const LeapSeconds& leap_seconds) {
 }
 
 std::optional<TimeNs> gps_from_unix(TimeNs unix_time_ns, const LeapSeconds& leap_seconds) {
-  const TimeNs since_epoch = unix_time_ns - kUnixDayOfGps * kSecondsPerDay * kSecond;
-  if (unix_time_ns < 0 || since_epoch < 0) return std::nullopt;
+  constexpr TimeNs kEpoch = kUnixDayOfGps * kSecondsPerDay * kSecond;
+  if (unix_time_ns < kEpoch) return std::nullopt;  // before the difference, which may overflow
+  const TimeNs since_epoch = unix_time_ns - kEpoch;
   const std::int64_t day = since_epoch / (kSecondsPerDay * kSecond);
   if (day > gps_day({kLastYear, 12, 31})) return std::nullopt;
   return since_epoch + leap_seconds.gps_minus_utc(date_from_gps_day(day)) * kSecond;
