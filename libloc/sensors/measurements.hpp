@@ -88,6 +88,31 @@ struct ReferenceMeasurement : Stamp {
   bool score = true;  ///< False where the recording says: do not score here.
 };
 
+/// Pose by an odometry that knows no metre: visual odometry of one camera, or another one whose scale is off. Lengths
+/// are in the odometry's own unit: length = scale * metres. A covariance that is not known is NaN.
+struct OdometryMeasurement : Stamp {
+  /// kNoTime: absolute, the pose of body in world (its position times the scale). Otherwise relative: the pose of body
+  /// at time_ns in the axes of body at this time.
+  TimeNs start_time_ns = kNoTime;
+  Eigen::Vector3d position = Eigen::Vector3d::Constant(kUnknown);         ///< [odometry's unit]
+  Eigen::Quaterniond rotation{kUnknown, kUnknown, kUnknown, kUnknown};    ///< q_world_body, or q_start_body
+  Eigen::Matrix3d position_cov = Eigen::Matrix3d::Constant(kUnknown);     ///< [unit^2], axes of position
+  Eigen::Matrix3d orientation_cov = Eigen::Matrix3d::Constant(kUnknown);  ///< [rad^2], axes of body at time_ns
+};
+
+/// One feature in one frame.
+struct FeatureObservation {
+  std::int64_t id = -1;                                            ///< the same for the same point of the scene
+  Eigen::Vector2d pixel_px = Eigen::Vector2d::Constant(kUnknown);  ///< u, v; distorted, as the camera sees it
+};
+
+/// The features of one frame with their identities (tracks).
+struct FeaturesMeasurement : Stamp {
+  std::int32_t camera = 0;     ///< Index of the camera in the rig.
+  double sigma_px = kUnknown;  ///< deviation of one coordinate
+  std::vector<FeatureObservation> features;
+};
+
 /// One sample of any stream.
 using Measurement =
     std::variant<ImuMeasurement, MagnetometerMeasurement, ImageMeasurement, GpsMeasurement, ReferenceMeasurement>;
