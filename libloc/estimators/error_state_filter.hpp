@@ -95,7 +95,7 @@ enum class FusionSource : std::uint8_t {
   kOdometry,
   kRelativeOdometry,
   kGps,
-  kVelocity,
+  kMeasuredVelocity,
   kZeroVelocity,
   kHeight,
   kHeading,
