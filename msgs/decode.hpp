@@ -28,6 +28,7 @@
 #include <string_view>
 
 #include "libloc/core/named_count.hpp"
+#include "libloc/geometry/geodesy.hpp"
 #include "libloc/sensors/measurements.hpp"
 
 namespace loc {
@@ -44,13 +45,6 @@ struct DecodeOptions {
 
   /// @throws std::invalid_argument when two kinds have the same channel.
   void check() const;
-};
-
-/// Point on the WGS 84 ellipsoid.
-struct GeodeticPoint {
-  double latitude = 0;   ///< [rad]
-  double longitude = 0;  ///< [rad]
-  double altitude = 0;   ///< [m] above the ellipsoid
 };
 
 class MeasurementDecoder {
