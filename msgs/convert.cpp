@@ -140,6 +140,31 @@ reference_t to_message(const ReferenceMeasurement& m) {
   return out;
 }
 
+odometry_t to_message(const OdometryMeasurement& m) {
+  odometry_t out{};
+  stamp_to(m, out);
+  out.start_time_ns = m.start_time_ns;
+  vector_to(m.position, out.position);
+  quaternion_to(m.rotation, out.q_wxyz);
+  matrix_to(m.position_cov, out.position_cov);
+  matrix_to(m.orientation_cov, out.orientation_cov);
+  return out;
+}
+
+tracks_t to_message(const FeaturesMeasurement& m) {
+  tracks_t out{};
+  stamp_to(m, out);
+  out.camera = m.camera;
+  out.sigma_px = m.sigma_px;
+  out.size = static_cast<std::int32_t>(m.features.size());
+  for (const FeatureObservation& feature : m.features) {
+    out.feature_id.push_back(feature.id);
+    out.u_px.push_back(feature.pixel_px.x());
+    out.v_px.push_back(feature.pixel_px.y());
+  }
+  return out;
+}
+
 estimate_t to_message(const Estimate& e, const std::string& method, const std::string& world) {
   estimate_t out{};
   out.time_ns = e.time_ns;
@@ -268,6 +293,44 @@ ReferenceMeasurement from_message(const reference_t& m) {
   return out;
 }
 
+OdometryMeasurement from_message(const odometry_t& m) {
+  OdometryMeasurement out;
+  stamp_from(m, "odometry_t", out);
+  if (m.start_time_ns != kNoTime && m.start_time_ns >= m.time_ns) {
+    reject("odometry_t.start_time_ns", m.start_time_ns, "must be before time_ns");
+  }
+  out.start_time_ns = m.start_time_ns;
+  out.position = vector_from(m.position);
+  const Eigen::Quaterniond q = quaternion_from(m.q_wxyz);
+  out.rotation = q.coeffs().hasNaN() ? q : unit_quaternion_from(m.q_wxyz, "odometry_t.q_wxyz");
+  out.position_cov = matrix_from(m.position_cov);
+  out.orientation_cov = matrix_from(m.orientation_cov);
+  return out;
+}
+
+FeaturesMeasurement from_message(const tracks_t& m) {
+  FeaturesMeasurement out;
+  stamp_from(m, "tracks_t", out);
+  if (m.camera < 0) reject("tracks_t.camera", m.camera, "must not be negative");
+  if (m.sigma_px < 0) {  // NaN: not known
+    throw DataError("tracks_t.sigma_px = " + to_text(m.sigma_px) + ": must not be negative");
+  }
+  const auto size = static_cast<std::size_t>(m.size);
+  if (m.size < 0 || m.feature_id.size() != size || m.u_px.size() != size || m.v_px.size() != size) {
+    reject("tracks_t.size", m.size, "must be the number of features");
+  }
+  // A feature that is in two places at once would count twice as an observation of one point.
+  std::vector<std::int64_t> ids = m.feature_id;
+  std::ranges::sort(ids);
+  const auto twice = std::ranges::adjacent_find(ids);
+  if (twice != ids.end()) reject("tracks_t.feature_id", *twice, "comes twice in one frame");
+  out.camera = m.camera;
+  out.sigma_px = m.sigma_px;
+  out.features.reserve(size);
+  for (std::size_t i = 0; i < size; ++i) out.features.push_back({m.feature_id[i], {m.u_px[i], m.v_px[i]}});
+  return out;
+}
+
 Estimate from_message(const estimate_t& m) {
   Estimate out;
   require_time(m.time_ns, "estimate_t", "an estimate");
@@ -341,6 +404,10 @@ const char* default_channel(StreamKind kind) {
       return "LOC_GPS";
     case StreamKind::kReference:
       return "LOC_REFERENCE";
+    case StreamKind::kOdometry:
+      return "LOC_ODOMETRY";
+    case StreamKind::kFeatures:
+      return "LOC_TRACKS";
   }
   return "LOC_UNKNOWN";
 }

@@ -16,7 +16,9 @@
 #include "loc/image_t.hpp"
 #include "loc/imu_t.hpp"
 #include "loc/magnetometer_t.hpp"
+#include "loc/odometry_t.hpp"
 #include "loc/reference_t.hpp"
+#include "loc/tracks_t.hpp"
 
 namespace loc {
 
@@ -25,6 +27,8 @@ magnetometer_t to_message(const MagnetometerMeasurement& m);
 image_t to_message(const ImageMeasurement& m);
 gps_fix_t to_message(const GpsMeasurement& m);
 reference_t to_message(const ReferenceMeasurement& m);
+odometry_t to_message(const OdometryMeasurement& m);
+tracks_t to_message(const FeaturesMeasurement& m);
 /// @param method, world as in estimate_t
 estimate_t to_message(const Estimate& e, const std::string& method, const std::string& world);
 
@@ -36,10 +40,13 @@ MagnetometerMeasurement from_message(const magnetometer_t& m);
 ImageMeasurement from_message(const image_t& m);
 GpsMeasurement from_message(const gps_fix_t& m);
 ReferenceMeasurement from_message(const reference_t& m);
+OdometryMeasurement from_message(const odometry_t& m);
+FeaturesMeasurement from_message(const tracks_t& m);
 Estimate from_message(const estimate_t& m);
 ClockLine from_message(const clock_t& m);
 
-/// Channel of each stream, unless the user names another: LOC_IMU, LOC_MAGNETOMETER, LOC_IMAGE, LOC_GPS, LOC_REFERENCE.
+/// Channel of each stream, unless the user names another: LOC_IMU, LOC_MAGNETOMETER, LOC_IMAGE, LOC_GPS, LOC_REFERENCE,
+/// LOC_ODOMETRY, LOC_TRACKS (features).
 const char* default_channel(StreamKind kind);
 inline constexpr const char* kEstimateChannel = "LOC_ESTIMATE";
 inline constexpr const char* kStatisticsChannel = "LOC_STATISTICS";

@@ -12,8 +12,9 @@
 namespace loc {
 namespace {
 
-constexpr std::array<StreamKind, kStreamKinds> kKinds{StreamKind::kImu, StreamKind::kMagnetometer, StreamKind::kImage,
-                                                      StreamKind::kGps, StreamKind::kReference};
+constexpr std::array<StreamKind, kStreamKinds> kKinds{
+    StreamKind::kImu,       StreamKind::kMagnetometer, StreamKind::kImage,   StreamKind::kGps,
+    StreamKind::kReference, StreamKind::kOdometry,     StreamKind::kFeatures};
 
 std::size_t index_of(StreamKind kind) {
   return static_cast<std::size_t>(kind);
@@ -26,6 +27,8 @@ std::optional<StreamKind> loc_kind(std::int64_t fingerprint) {
   if (fingerprint == image_t::getHash()) return StreamKind::kImage;
   if (fingerprint == gps_fix_t::getHash()) return StreamKind::kGps;
   if (fingerprint == reference_t::getHash()) return StreamKind::kReference;
+  if (fingerprint == odometry_t::getHash()) return StreamKind::kOdometry;
+  if (fingerprint == tracks_t::getHash()) return StreamKind::kFeatures;
   return std::nullopt;
 }
 
@@ -41,6 +44,10 @@ Measurement decode_loc(StreamKind kind, std::span<const std::uint8_t> data) {
       return from_message(decode_message<gps_fix_t>(data));
     case StreamKind::kReference:
       return from_message(decode_message<reference_t>(data));
+    case StreamKind::kOdometry:
+      return from_message(decode_message<odometry_t>(data));
+    case StreamKind::kFeatures:
+      return from_message(decode_message<tracks_t>(data));
   }
   throw DataError("no such stream");
 }
@@ -147,8 +154,8 @@ std::optional<Measurement> MeasurementDecoder::decode(std::string_view channel, 
       return std::nullopt;
     }
     std::optional<Measurement> measurement = s.convert(*kind, data);
-    // Only a message that could be decoded makes its channel the stream's. Images may come on several.
-    if (*kind != StreamKind::kImage) found = channel;
+    // Only a message that could be decoded makes its channel the stream's. Those of cameras may come on several.
+    if (!has_camera(*kind)) found = channel;
     if (measurement && stamp_of(*measurement).host_time_ns == kNoTime) {
       stamp_of(*measurement).host_time_ns = receive_time_ns;
     }

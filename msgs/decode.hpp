@@ -3,8 +3,8 @@
 //
 // Which channel carries what: a stream that the options name comes from that channel only. Otherwise the default
 // channel (default_channel()) and, as types are recognised by their fingerprint, also any other one: the first channel
-// that carries a stream keeps it (images: every channel, the camera's index tells them apart), the default channel
-// takes it over when it appears; what other channels send of the same stream is skipped and counted.
+// that carries a stream keeps it (images and features: every channel, the camera's index tells them apart), the default
+// channel takes it over when it appears; what other channels send of the same stream is skipped and counted.
 //
 // Types: those of package loc, and of ASPN-23 (package aspn23_lcm, the open standard of the pntOS recordings):
 //  - measurement_IMU: integrated samples (delta v, delta theta over the period that ends at the time of validity) are

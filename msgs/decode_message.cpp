@@ -7,6 +7,7 @@
 #include "loc/imu_t.hpp"
 #include "loc/magnetometer_t.hpp"
 #include "loc/map_points_t.hpp"
+#include "loc/odometry_t.hpp"
 #include "loc/reference_t.hpp"
 #include "loc/source_status_t.hpp"
 #include "loc/statistics_t.hpp"
@@ -81,6 +82,7 @@ template image_t decode_message<image_t>(std::span<const std::uint8_t>);
 template imu_t decode_message<imu_t>(std::span<const std::uint8_t>);
 template magnetometer_t decode_message<magnetometer_t>(std::span<const std::uint8_t>);
 template map_points_t decode_message<map_points_t>(std::span<const std::uint8_t>);
+template odometry_t decode_message<odometry_t>(std::span<const std::uint8_t>);
 template reference_t decode_message<reference_t>(std::span<const std::uint8_t>);
 template source_status_t decode_message<source_status_t>(std::span<const std::uint8_t>);
 template statistics_t decode_message<statistics_t>(std::span<const std::uint8_t>);

@@ -28,6 +28,7 @@ struct Unit {
   double to_si;  // for a time the decimal exponent
 };
 
+// Prefixes; the axes follow: x y z, of a quaternion w x y z, of GPS e n u.
 constexpr std::array kTriads{
     std::pair{std::string_view("w"), Quantity::kAngularVelocity},
     std::pair{std::string_view("g"), Quantity::kAngularVelocity},
@@ -47,8 +48,30 @@ constexpr std::array kTriads{
     std::pair{std::string_view("q_rs_"), Quantity::kOrientation},
     std::pair{std::string_view("b_w_rs_s_"), Quantity::kUnused},
     std::pair{std::string_view("b_a_rs_s_"), Quantity::kUnused},
+    std::pair{std::string_view("v"), Quantity::kGpsVelocity},
+    std::pair{std::string_view("sigma_"), Quantity::kGpsSigma},
+    std::pair{std::string_view("sigma_v"), Quantity::kGpsVelocitySigma},
+    std::pair{std::string_view("odo_p"), Quantity::kOdometryPosition},
+    std::pair{std::string_view("odo_q"), Quantity::kOdometryOrientation},
+    std::pair{std::string_view("odo_sigma_p"), Quantity::kOdometryPositionSigma},
+    std::pair{std::string_view("odo_sigma_theta_"), Quantity::kOdometryOrientationSigma},
 };
-constexpr std::array<std::string_view, 4> kTimeNames{"time", "timestamp", "t", "ts"};
+constexpr std::array kSingles{
+    Name{"time", Quantity::kTime, 0},
+    Name{"timestamp", Quantity::kTime, 0},
+    Name{"t", Quantity::kTime, 0},
+    Name{"ts", Quantity::kTime, 0},
+    Name{"score", Quantity::kScore, 0},
+    Name{"latitude", Quantity::kLatitudeLongitude, 0},
+    Name{"lat", Quantity::kLatitudeLongitude, 0},
+    Name{"longitude", Quantity::kLatitudeLongitude, 1},
+    Name{"lon", Quantity::kLatitudeLongitude, 1},
+    Name{"altitude", Quantity::kAltitude, 0},
+    Name{"alt", Quantity::kAltitude, 0},
+    Name{"fix", Quantity::kGpsFix, 0},
+    Name{"satellites", Quantity::kSatellites, 0},
+    Name{"odo_start", Quantity::kOdometryStart, 0},
+};
 
 constexpr std::array kUnits{
     Unit{"ns", Quantity::kTime, -9},
@@ -82,14 +105,48 @@ constexpr std::array kUnits{
     Unit{"m/s", Quantity::kVelocity, 1},
     Unit{"m_s", Quantity::kVelocity, 1},
     Unit{"ms^-1", Quantity::kVelocity, 1},
+    Unit{"rad", Quantity::kLatitudeLongitude, 1},
+    Unit{"deg", Quantity::kLatitudeLongitude, kDegree},
+    Unit{"m", Quantity::kAltitude, 1},
+    Unit{"m/s", Quantity::kGpsVelocity, 1},
+    Unit{"m_s", Quantity::kGpsVelocity, 1},
+    Unit{"ms^-1", Quantity::kGpsVelocity, 1},
+    Unit{"m", Quantity::kGpsSigma, 1},
+    Unit{"m/s", Quantity::kGpsVelocitySigma, 1},
+    Unit{"m_s", Quantity::kGpsVelocitySigma, 1},
+    Unit{"ms^-1", Quantity::kGpsVelocitySigma, 1},
+    Unit{"ns", Quantity::kOdometryStart, -9},
+    Unit{"us", Quantity::kOdometryStart, -6},
+    Unit{"ms", Quantity::kOdometryStart, -3},
+    Unit{"s", Quantity::kOdometryStart, 0},
+    Unit{"unit", Quantity::kOdometryPosition, 1},
+    Unit{"m", Quantity::kOdometryPosition, 1},
+    Unit{"unit", Quantity::kOdometryPositionSigma, 1},
+    Unit{"m", Quantity::kOdometryPositionSigma, 1},
+    Unit{"rad", Quantity::kOdometryOrientationSigma, 1},
+    Unit{"deg", Quantity::kOdometryOrientationSigma, kDegree},
 };
+
+std::string_view axis_letters(Quantity quantity) {
+  switch (quantity) {
+    case Quantity::kOrientation:
+    case Quantity::kOdometryOrientation:
+      return "wxyz";
+    case Quantity::kGpsVelocity:
+    case Quantity::kGpsSigma:
+    case Quantity::kGpsVelocitySigma:
+      return "enu";
+    default:
+      return "xyz";
+  }
+}
 
 const std::vector<Name>& names() {
   static std::vector<std::string> texts;
   static const std::vector<Name> result = [] {
     std::vector<std::pair<Quantity, std::size_t>> where;
     for (const auto& [prefix, quantity] : kTriads) {
-      const std::string_view axes = quantity == Quantity::kOrientation ? "wxyz" : "xyz";
+      const std::string_view axes = axis_letters(quantity);
       for (std::size_t i = 0; i < axes.size(); ++i) {
         texts.push_back(std::string(prefix) + axes[i]);
         where.emplace_back(quantity, i);
@@ -97,15 +154,24 @@ const std::vector<Name>& names() {
     }
     std::vector<Name> list;
     for (std::size_t i = 0; i < texts.size(); ++i) list.push_back({texts[i], where[i].first, where[i].second});
-    for (const std::string_view name : kTimeNames) list.push_back({name, Quantity::kTime, 0});
-    list.push_back({"score", Quantity::kScore, 0});
+    list.insert(list.end(), kSingles.begin(), kSingles.end());
     return list;
   }();
   return result;
 }
 
 bool has_unit(Quantity quantity) {
-  return quantity != Quantity::kOrientation && quantity != Quantity::kScore && quantity != Quantity::kUnused;
+  switch (quantity) {
+    case Quantity::kOrientation:
+    case Quantity::kOdometryOrientation:
+    case Quantity::kScore:
+    case Quantity::kGpsFix:
+    case Quantity::kSatellites:
+    case Quantity::kUnused:
+      return false;
+    default:
+      return true;
+  }
 }
 
 std::string small_letters(std::string_view text, bool drop_blanks) {
@@ -137,6 +203,7 @@ const std::string& default_unit(Quantity quantity, const CsvOptions& options) {
   static const std::string kMetrePerSecond = "m/s";
   switch (quantity) {
     case Quantity::kTime:
+    case Quantity::kOdometryStart:
       return options.time_unit;
     case Quantity::kAngularVelocity:
       return options.angular_velocity_unit;
@@ -145,8 +212,14 @@ const std::string& default_unit(Quantity quantity, const CsvOptions& options) {
     case Quantity::kMagneticField:
       return options.magnetic_field_unit;
     case Quantity::kPosition:
+    case Quantity::kAltitude:
+    case Quantity::kGpsSigma:
+    case Quantity::kOdometryPosition:
+    case Quantity::kOdometryPositionSigma:
       return kMetre;
     case Quantity::kVelocity:
+    case Quantity::kGpsVelocity:
+    case Quantity::kGpsVelocitySigma:
       return kMetrePerSecond;
     default:
       return kNone;
@@ -197,7 +270,7 @@ Column parse_column(std::string_view heading, const std::string& where, const Cs
     throw DataError(where + ": " + quoted + ": unit '" + *unit + "' is not known; known are " +
                     known_units(found->quantity));
   }
-  if (found->quantity == Quantity::kTime) {
+  if (found->quantity == Quantity::kTime || found->quantity == Quantity::kOdometryStart) {
     column.time_exponent = static_cast<int>(known->to_si);
   } else {
     column.to_si = known->to_si;
@@ -217,8 +290,15 @@ std::size_t axes_of(Quantity quantity) {
   switch (quantity) {
     case Quantity::kTime:
     case Quantity::kScore:
+    case Quantity::kAltitude:
+    case Quantity::kGpsFix:
+    case Quantity::kSatellites:
+    case Quantity::kOdometryStart:
       return 1;
+    case Quantity::kLatitudeLongitude:
+      return 2;
     case Quantity::kOrientation:
+    case Quantity::kOdometryOrientation:
       return 4;
     default:
       return 3;
@@ -255,9 +335,31 @@ std::vector<Column> parse_heading(std::string_view line, const std::string& wher
   if (present(Quantity::kAngularVelocity) != present(Quantity::kSpecificForce)) {
     throw DataError(where + ": an IMU has both, angular velocity (wx wy wz) and specific force (ax ay az)");
   }
+  const auto needs = [&](Quantity what, const char* name, Quantity needed, const char* needed_names) {
+    if (present(what) && !present(needed)) {
+      throw DataError(where + ": " + name + " without " + needed_names + ": belongs to no measurement");
+    }
+  };
+  for (const auto& [what, name] :
+       {std::pair{Quantity::kAltitude, "altitude"}, std::pair{Quantity::kGpsVelocity, "ve vn vu"},
+        std::pair{Quantity::kGpsSigma, "sigma_e sigma_n sigma_u"}, std::pair{Quantity::kGpsFix, "fix"},
+        std::pair{Quantity::kSatellites, "satellites"}}) {
+    needs(what, name, Quantity::kLatitudeLongitude, "latitude, longitude");
+  }
+  needs(Quantity::kGpsVelocitySigma, "sigma_ve sigma_vn sigma_vu", Quantity::kGpsVelocity, "ve vn vu");
+  for (const auto& [what, name] :
+       {std::pair{Quantity::kOdometryStart, "odo_start"}, std::pair{Quantity::kOdometryOrientation, "odo_qw .. odo_qz"},
+        std::pair{Quantity::kOdometryPositionSigma, "odo_sigma_px .."}}) {
+    needs(what, name, Quantity::kOdometryPosition, "odo_px odo_py odo_pz");
+  }
+  needs(Quantity::kOdometryOrientationSigma, "odo_sigma_theta_x ..", Quantity::kOdometryOrientation,
+        "odo_qw odo_qx odo_qy odo_qz");
   if (!present(Quantity::kAngularVelocity) && !present(Quantity::kMagneticField) && !present(Quantity::kOrientation) &&
-      !present(Quantity::kPosition)) {
-    throw DataError(where + ": no column holds a measurement (wx wy wz ax ay az, mx my mz, qw qx qy qz, px py pz)");
+      !present(Quantity::kPosition) && !present(Quantity::kLatitudeLongitude) &&
+      !present(Quantity::kOdometryPosition)) {
+    throw DataError(where +
+                    ": no column holds a measurement (wx wy wz ax ay az, mx my mz, qw qx qy qz, px py pz, latitude "
+                    "longitude, odo_px odo_py odo_pz)");
   }
   return columns;
 }

@@ -19,15 +19,27 @@ enum class Quantity : std::uint8_t {
   kPosition,
   kVelocity,
   kScore,
+  kLatitudeLongitude,
+  kAltitude,
+  kGpsVelocity,
+  kGpsSigma,
+  kGpsVelocitySigma,
+  kGpsFix,
+  kSatellites,
+  kOdometryStart,
+  kOdometryPosition,
+  kOdometryOrientation,
+  kOdometryPositionSigma,
+  kOdometryOrientationSigma,
   kUnused
 };
-inline constexpr std::size_t kQuantities = 9;
+inline constexpr std::size_t kQuantities = 21;
 /// Columns that a quantity has when it is complete.
 std::size_t axes_of(Quantity quantity);
 
 struct Column {
   Quantity quantity = Quantity::kUnused;
-  std::size_t axis = 0;    ///< x y z; orientation w x y z
+  std::size_t axis = 0;    ///< x y z; orientation w x y z; latitude, longitude; east, north, up
   double to_si = 1;        ///< SI value of one unit; not for time
   int time_exponent = -9;  ///< A unit of time is 10^this seconds.
   std::string heading;     ///< as written, for messages

@@ -17,6 +17,8 @@ class CsvSource final : public MeasurementSource {
       const auto row = table_.next();
       if (!row) return std::nullopt;
       if (row->magnetometer) push(*row->magnetometer);
+      if (row->gps) push(*row->gps);
+      if (row->odometry) push(*row->odometry);
       if (row->reference) push(*row->reference);
       if (row->imu) push(*row->imu);
     }

@@ -10,13 +10,24 @@
 //   reference position    px py pz, p_rs_r_x..                                       m
 //   reference velocity    vx vy vz, v_rs_r_x..                                       m/s
 //   score                 score (0 or 1: compare with the reference here)            none
+//   GPS fix               latitude longitude, lat lon (WGS 84)                       deg, rad
+//                         altitude, alt (above the ellipsoid)                        m
+//                         ve vn vu (velocity east, north, up)                        m/s
+//                         sigma_e sigma_n sigma_u, sigma_ve sigma_vn sigma_vu        m, m/s
+//                         fix (a number, as GpsFixType), satellites                  none
+//   odometry              odo_px odo_py odo_pz (absolute: body in world; relative:   m, unit (both: odometry's own)
+//                         body in the axes of body at odo_start)
+//                         odo_qw odo_qx odo_qy odo_qz                                none
+//                         odo_start (empty: absolute)                                as time
+//                         odo_sigma_px.., odo_sigma_theta_x..                        m or unit, rad or deg
 //   not used              b_w_rs_s_x.., b_a_rs_s_x.. (EuRoC's reference biases)      any
 //
 // time_ns,wx_rad_s,... is the same as #timestamp [ns],wx [rad s^-1],...: this is EuRoC's own form, too. The unit [arb]
 // of a magnetic field is what the sensor counts in; CsvOptions tells how many tesla that is. Columns come in any order
-// and number; a time and one complete triad are needed. The cells of one triad may all be empty (a magnetometer at its
-// own rate), never some of them. Comments: only the heading may begin with #.
-// Blank lines before it are passed over.
+// and number; a time and one complete triad (or latitude and longitude) are needed. The cells of one triad may all be
+// empty (a magnetometer at its own rate), never some of them. A deviation fills the diagonal of a covariance; what has
+// none is NaN there, and correlations have no columns (LCM logs hold them). A fix without the column fix is 3-D when it
+// has an altitude, otherwise 2-D. Comments: only the heading may begin with #. Blank lines before it are passed over.
 #pragma once
 
 #include <cstdint>
@@ -39,7 +50,8 @@ struct CsvOptions {
   double tesla_per_unit = 0;  ///< [T], for the unit arb; 0: arb is an error.
 };
 
-/// A recording in one file; measurements of one time come row by row, within a row magnetometer, reference, IMU.
+/// A recording in one file; measurements of one time come row by row, within a row magnetometer, GPS, odometry,
+/// reference, IMU.
 /// Rows may share a time (one sensor per row). Skipped and counted: rows that go back in time
 /// ("rows.skipped.time_not_increasing"), in a row of the same time as the one before a sensor that was there already
 /// ("imu.skipped.time_not_increasing"), rows that hold no measurement ("rows.skipped.empty") or nothing at all

@@ -16,10 +16,7 @@ class Stream {
  public:
   Stream(const fs::path& path, StreamKind kind, const CsvOptions& options)
       : table_(path, options, stream_name(kind)), kind_(kind) {
-    const io::Quantity needed = kind == StreamKind::kImu            ? io::Quantity::kAngularVelocity
-                                : kind == StreamKind::kMagnetometer ? io::Quantity::kMagneticField
-                                                                    : io::Quantity::kOrientation;
-    if (!table_.has(needed)) throw DataError(path.string() + ": no columns of " + stream_name(kind));
+    if (!table_.has(needed(kind))) throw DataError(path.string() + ": no columns of " + stream_name(kind));
   }
 
   // Read when it is asked for, so that a bad row does not take the good one before it along.
@@ -35,20 +32,48 @@ class Stream {
   void add_counts(NamedCounts& counts) const { table_.add_counts(counts); }
 
  private:
+  static io::Quantity needed(StreamKind kind) {
+    switch (kind) {
+      case StreamKind::kImu:
+        return io::Quantity::kAngularVelocity;
+      case StreamKind::kMagnetometer:
+        return io::Quantity::kMagneticField;
+      case StreamKind::kGps:
+        return io::Quantity::kLatitudeLongitude;
+      case StreamKind::kOdometry:
+        return io::Quantity::kOdometryPosition;
+      default:
+        return io::Quantity::kOrientation;
+    }
+  }
+
+  template <class M>
+  void take_over(const std::optional<M>& measurement) {
+    if (measurement) head_ = *measurement;
+  }
+
   void advance() {
     head_.reset();
-    if (const auto row = table_.next()) {
-      if (kind_ == StreamKind::kImu && row->imu) {
-        head_ = *row->imu;
-      } else if (kind_ == StreamKind::kMagnetometer && row->magnetometer) {
-        head_ = *row->magnetometer;
-      } else if (kind_ == StreamKind::kReference && row->reference) {
-        head_ = *row->reference;
-      } else {
-        throw DataError(table_.where() + ": no cells of " + stream_name(kind_));
-      }
-      stamp_of(*head_).sequence = sequence_++;
+    const auto row = table_.next();
+    if (!row) return;
+    switch (kind_) {
+      case StreamKind::kImu:
+        take_over(row->imu);
+        break;
+      case StreamKind::kMagnetometer:
+        take_over(row->magnetometer);
+        break;
+      case StreamKind::kGps:
+        take_over(row->gps);
+        break;
+      case StreamKind::kOdometry:
+        take_over(row->odometry);
+        break;
+      default:
+        take_over(row->reference);
     }
+    if (!head_) throw DataError(table_.where() + ": no cells of " + stream_name(kind_));
+    stamp_of(*head_).sequence = sequence_++;
   }
 
   io::Table table_;
@@ -71,15 +96,15 @@ class EurocSource final : public MeasurementSource {
     // In the order of equal times. EuRoC counts nanoseconds throughout, though not every heading says so.
     CsvOptions csv;
     csv.time_unit = "ns";
-    const fs::path field = mav / "mag0" / "data.csv";
-    if (options.read_magnetometer && fs::exists(io::status_of(field))) {
-      streams_[0].emplace(field, StreamKind::kMagnetometer, csv);
-    }
-    const fs::path reference = mav / "state_groundtruth_estimate0" / "data.csv";
-    if (options.read_reference && fs::exists(io::status_of(reference))) {
-      streams_[1].emplace(reference, StreamKind::kReference, csv);
-    }
-    streams_[2].emplace(imu, StreamKind::kImu, csv);
+    const auto open = [&](std::size_t place, bool wanted, const char* name, StreamKind kind) {
+      const fs::path file = mav / name / "data.csv";
+      if (wanted && fs::exists(io::status_of(file))) streams_[place].emplace(file, kind, csv);
+    };
+    open(0, options.read_magnetometer, "mag0", StreamKind::kMagnetometer);
+    open(1, options.read_gps, "gps0", StreamKind::kGps);
+    open(2, options.read_odometry, "odometry0", StreamKind::kOdometry);
+    open(3, options.read_reference, "state_groundtruth_estimate0", StreamKind::kReference);
+    streams_[4].emplace(imu, StreamKind::kImu, csv);
   }
 
   std::optional<Measurement> next() override {
@@ -101,7 +126,7 @@ class EurocSource final : public MeasurementSource {
   }
 
  private:
-  std::array<std::optional<Stream>, 3> streams_;
+  std::array<std::optional<Stream>, 5> streams_;
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "libloc/core/check.hpp"
@@ -10,8 +11,8 @@ namespace loc::io {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-enum : std::size_t { kMagnetometerRow = 0, kReferenceRow = 1, kImuRow = 2 };
-constexpr std::array<const char*, 3> kRowNames{"magnetometer", "reference", "imu"};
+enum : std::size_t { kMagnetometerRow = 0, kGpsRow = 1, kOdometryRow = 2, kReferenceRow = 3, kImuRow = 4 };
+constexpr std::array<const char*, 5> kRowNames{"magnetometer", "gps", "odometry", "reference", "imu"};
 
 }  // namespace
 
@@ -43,11 +44,18 @@ std::optional<Row> Table::next() {
   ahead_.reset();
   if (!row) row = read_row();
   if (row) {
-    const std::array<bool, 3> present{row->magnetometer.has_value(), row->reference.has_value(), row->imu.has_value()};
+    const std::array<bool, kSensors> present{row->magnetometer.has_value(), row->gps.has_value(),
+                                             row->odometry.has_value(), row->reference.has_value(),
+                                             row->imu.has_value()};
     for (std::size_t i = 0; i < present.size(); ++i) {
       if (present[i]) ++read_[i];
     }
     if (row->magnetometer && !row->magnetometer->magnetic_field.allFinite()) ++not_finite_[kMagnetometerRow];
+    if (row->gps && !(std::isfinite(row->gps->latitude) && std::isfinite(row->gps->longitude))) ++not_finite_[kGpsRow];
+    if (row->odometry && !(row->odometry->position.allFinite() &&
+                           (!has(Quantity::kOdometryOrientation) || row->odometry->rotation.coeffs().allFinite()))) {
+      ++not_finite_[kOdometryRow];
+    }
     if (row->imu && !(row->imu->angular_velocity.allFinite() && row->imu->specific_force.allFinite())) {
       ++not_finite_[kImuRow];
     }
@@ -107,6 +115,8 @@ void Table::drop_repeated(Row& row) {
     }
   };
   check(row.magnetometer, kMagnetometerRow);
+  check(row.gps, kGpsRow);
+  check(row.odometry, kOdometryRow);
   check(row.reference, kReferenceRow);
   check(row.imu, kImuRow);
 }
@@ -157,22 +167,102 @@ Row Table::convert(TimeNs time_ns) {
     row.magnetometer->magnetic_field = a;
   }
 
+  row.gps = convert_gps(time_ns);
+  row.odometry = convert_odometry(time_ns);
+  row.reference = convert_reference(time_ns);
+  return row;
+}
+
+void Table::reject(Quantity quantity, std::size_t axis, const std::string& why) const {
+  const std::size_t cell = *at_[static_cast<std::size_t>(quantity)][axis];
+  throw DataError(lines_.where() + ": column '" + columns_[cell].heading + "': '" + std::string(cells_[cell]) +
+                  "': " + why);
+}
+
+// Normalised; NaN where the cells are NaN or empty, and then any stays as it was.
+Eigen::Quaterniond Table::take_quaternion(Quantity quantity, const char* what, bool& any) const {
+  std::array<double, 4> wxyz{kNan, kNan, kNan, kNan};
+  if (!take(quantity, wxyz.data())) return {kNan, kNan, kNan, kNan};
+  any = true;
+  const Eigen::Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+  if (std::abs(q.norm() - 1) > 1e-2) {  // false for NaN, which passes
+    throw DataError(lines_.where() + ": " + what + " quaternion with norm " + to_text(q.norm()) + ": must be 1");
+  }
+  return std::isfinite(q.norm()) ? q.normalized() : Eigen::Quaterniond(kNan, kNan, kNan, kNan);
+}
+
+std::int64_t Table::take_integer(Quantity quantity, std::int64_t low, std::int64_t high, std::int64_t otherwise) const {
+  double value = 0;
+  if (!take(quantity, &value)) return otherwise;
+  if (!(value >= static_cast<double>(low) && value <= static_cast<double>(high) && value == std::floor(value))) {
+    reject(quantity, 0, "must be a whole number in [" + std::to_string(low) + ", " + std::to_string(high) + "]");
+  }
+  return static_cast<std::int64_t>(value);
+}
+
+void Table::take_covariance(Quantity sigma, Eigen::Matrix3d& cov) const {
+  Eigen::Vector3d s;
+  if (!take(sigma, s.data())) return;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    if (s[i] < 0) reject(sigma, static_cast<std::size_t>(i), "a deviation must not be negative");
+  }
+  cov = s.cwiseAbs2().asDiagonal();
+}
+
+std::optional<GpsMeasurement> Table::convert_gps(TimeNs time_ns) const {
+  GpsMeasurement gps;
+  gps.time_ns = time_ns;
+  Eigen::Vector2d place(kNan, kNan);
+  bool any = take(Quantity::kLatitudeLongitude, place.data());
+  any = take(Quantity::kAltitude, &gps.altitude) || any;
+  any = take(Quantity::kGpsVelocity, gps.velocity_enu.data()) || any;
+  if (std::abs(place.x()) > std::numbers::pi / 2) {
+    reject(Quantity::kLatitudeLongitude, 0, "must be within 90 degrees of the equator");
+  }
+  if (std::abs(place.y()) > 2 * std::numbers::pi) {
+    reject(Quantity::kLatitudeLongitude, 1, "must be within 360 degrees");
+  }
+  gps.latitude = place.x();
+  gps.longitude = place.y();
+  const GpsFixType by_content = std::isnan(gps.latitude)   ? GpsFixType::kNone
+                                : std::isnan(gps.altitude) ? GpsFixType::k2d
+                                                           : GpsFixType::k3d;
+  gps.fix = static_cast<GpsFixType>(take_integer(Quantity::kGpsFix, static_cast<std::int64_t>(GpsFixType::kNone),
+                                                 static_cast<std::int64_t>(GpsFixType::kFixed),
+                                                 static_cast<std::int64_t>(by_content)));
+  gps.satellites = static_cast<std::int32_t>(take_integer(Quantity::kSatellites, -1, 1000, -1));
+  take_covariance(Quantity::kGpsSigma, gps.position_cov);
+  take_covariance(Quantity::kGpsVelocitySigma, gps.velocity_cov);
+  if (!any) return std::nullopt;
+  return gps;
+}
+
+std::optional<OdometryMeasurement> Table::convert_odometry(TimeNs time_ns) const {
+  OdometryMeasurement odometry;
+  odometry.time_ns = time_ns;
+  bool any = take(Quantity::kOdometryPosition, odometry.position.data());
+  odometry.rotation = take_quaternion(Quantity::kOdometryOrientation, "odometry", any);
+  take_covariance(Quantity::kOdometryPositionSigma, odometry.position_cov);
+  take_covariance(Quantity::kOdometryOrientationSigma, odometry.orientation_cov);
+  if (has(Quantity::kOdometryStart)) {
+    const std::size_t cell = *at_[static_cast<std::size_t>(Quantity::kOdometryStart)][0];
+    if (!cells_[cell].empty()) {
+      const auto start_ns = parse_time(cells_[cell], columns_[cell].time_exponent);
+      if (!start_ns) reject(Quantity::kOdometryStart, 0, "is not a time");
+      if (*start_ns >= time_ns) reject(Quantity::kOdometryStart, 0, "must be before the time of its row");
+      odometry.start_time_ns = *start_ns;
+    }
+  }
+  if (!any) return std::nullopt;
+  return odometry;
+}
+
+std::optional<ReferenceMeasurement> Table::convert_reference(TimeNs time_ns) const {
   ReferenceMeasurement reference;
   reference.time_ns = time_ns;
-  reference.q_world_body = Eigen::Quaterniond(kNan, kNan, kNan, kNan);
-  reference.position.setConstant(kNan);
-  reference.velocity.setConstant(kNan);
-  std::array<double, 4> wxyz{};
   double score = 1;
   bool any = false;
-  if (take(Quantity::kOrientation, wxyz.data())) {
-    any = true;
-    const Eigen::Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
-    if (std::abs(q.norm() - 1) > 1e-2) {  // false for NaN, which passes
-      throw DataError(lines_.where() + ": reference quaternion with norm " + to_text(q.norm()) + ": must be 1");
-    }
-    if (std::isfinite(q.norm())) reference.q_world_body = q.normalized();
-  }
+  reference.q_world_body = take_quaternion(Quantity::kOrientation, "reference", any);
   any = take(Quantity::kPosition, reference.position.data()) || any;
   any = take(Quantity::kVelocity, reference.velocity.data()) || any;
   if (take(Quantity::kScore, &score)) {
@@ -181,8 +271,8 @@ Row Table::convert(TimeNs time_ns) {
     }
     reference.score = score == 1;
   }
-  if (any) row.reference = reference;
-  return row;
+  if (!any) return std::nullopt;
+  return reference;
 }
 
 void Table::add_counts(NamedCounts& counts) const {

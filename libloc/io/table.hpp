@@ -18,9 +18,11 @@ namespace loc::io {
 
 /// What one row held, at its time: something.
 struct Row {
-  bool empty() const { return !magnetometer && !reference && !imu; }
+  bool empty() const { return !magnetometer && !gps && !odometry && !reference && !imu; }
 
   std::optional<MagnetometerMeasurement> magnetometer;
+  std::optional<GpsMeasurement> gps;
+  std::optional<OdometryMeasurement> odometry;
   std::optional<ReferenceMeasurement> reference;
   std::optional<ImuMeasurement> imu;
 };
@@ -41,6 +43,13 @@ class Table {
  private:
   std::optional<Row> read_row();
   Row convert(TimeNs time_ns);
+  std::optional<ReferenceMeasurement> convert_reference(TimeNs time_ns) const;
+  std::optional<GpsMeasurement> convert_gps(TimeNs time_ns) const;
+  std::optional<OdometryMeasurement> convert_odometry(TimeNs time_ns) const;
+  std::int64_t take_integer(Quantity quantity, std::int64_t low, std::int64_t high, std::int64_t otherwise) const;
+  void take_covariance(Quantity sigma, Eigen::Matrix3d& cov) const;
+  Eigen::Quaterniond take_quaternion(Quantity quantity, const char* what, bool& any) const;
+  [[noreturn]] void reject(Quantity quantity, std::size_t axis, const std::string& why) const;
   void drop_repeated(Row& row);
   bool take(Quantity quantity, double* values) const;
 
@@ -54,11 +63,12 @@ class Table {
   std::int64_t rows_back_ = 0;
   std::int64_t blank_ = 0;
   std::int64_t empty_ = 0;
-  // magnetometer, reference, imu
-  std::array<TimeNs, 3> last_{kNoTime, kNoTime, kNoTime};
-  std::array<std::int64_t, 3> repeated_{};
-  std::array<std::int64_t, 3> read_{};
-  std::array<std::int64_t, 3> not_finite_{};
+  // magnetometer, gps, odometry, reference, imu
+  static constexpr std::size_t kSensors = 5;
+  std::array<TimeNs, kSensors> last_{kNoTime, kNoTime, kNoTime, kNoTime, kNoTime};
+  std::array<std::int64_t, kSensors> repeated_{};
+  std::array<std::int64_t, kSensors> read_{};
+  std::array<std::int64_t, kSensors> not_finite_{};
 };
 
 }  // namespace loc::io

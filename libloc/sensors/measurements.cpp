@@ -14,6 +14,10 @@ const char* stream_name(StreamKind kind) {
       return "gps";
     case StreamKind::kReference:
       return "reference";
+    case StreamKind::kOdometry:
+      return "odometry";
+    case StreamKind::kFeatures:
+      return "features";
   }
   return "unknown";
 }

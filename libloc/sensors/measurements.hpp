@@ -114,11 +114,19 @@ struct FeaturesMeasurement : Stamp {
 };
 
 /// One sample of any stream.
-using Measurement =
-    std::variant<ImuMeasurement, MagnetometerMeasurement, ImageMeasurement, GpsMeasurement, ReferenceMeasurement>;
+using Measurement = std::variant<ImuMeasurement, MagnetometerMeasurement, ImageMeasurement, GpsMeasurement,
+                                 ReferenceMeasurement, OdometryMeasurement, FeaturesMeasurement>;
 
 /// Index of the alternatives above; names for reports.
-enum class StreamKind : std::uint8_t { kImu = 0, kMagnetometer = 1, kImage = 2, kGps = 3, kReference = 4 };
+enum class StreamKind : std::uint8_t {
+  kImu = 0,
+  kMagnetometer = 1,
+  kImage = 2,
+  kGps = 3,
+  kReference = 4,
+  kOdometry = 5,
+  kFeatures = 6
+};
 inline constexpr std::size_t kStreamKinds = std::variant_size_v<Measurement>;
 const char* stream_name(StreamKind kind);
 
@@ -130,6 +138,16 @@ inline const Stamp& stamp_of(const Measurement& m) {
 }
 inline Stamp& stamp_of(Measurement& m) {
   return std::visit([](auto& x) -> Stamp& { return x; }, m);
+}
+/// A kind of which each camera has a stream of its own: images, features.
+inline bool has_camera(StreamKind kind) {
+  return kind == StreamKind::kImage || kind == StreamKind::kFeatures;
+}
+/// Index of the camera that it comes from; 0 for what comes from none.
+inline std::int32_t camera_of(const Measurement& m) {
+  if (const auto* image = std::get_if<ImageMeasurement>(&m)) return image->camera;
+  if (const auto* features = std::get_if<FeaturesMeasurement>(&m)) return features->camera;
+  return 0;
 }
 
 }  // namespace loc

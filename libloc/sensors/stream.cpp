@@ -9,8 +9,8 @@
 namespace loc {
 namespace {
 
-// Place among samples of one time.
-constexpr std::array<int, kStreamKinds> kRank = {4, 0, 1, 2, 3};
+// Place among samples of one time, by StreamKind.
+constexpr std::array<int, kStreamKinds> kRank = {6, 0, 1, 3, 5, 4, 2};
 
 // a - b; far apart times give the largest difference there is instead of an overflow.
 TimeNs difference(TimeNs a, TimeNs b) {
@@ -35,13 +35,13 @@ StreamMerger::StreamMerger(StreamMergerOptions options) : options_(options) {
 }
 
 std::size_t StreamMerger::queue_of(StreamKind kind, int camera) {
-  if (kind != StreamKind::kImage || camera <= 0) return static_cast<std::size_t>(kind);
-  return kStreamKinds - 1 + std::min(static_cast<std::size_t>(camera), kCameraQueues - 1);
+  if (!has_camera(kind) || camera <= 0) return static_cast<std::size_t>(kind);
+  const std::size_t further = std::min(static_cast<std::size_t>(camera), kCameraQueues - 1) - 1;
+  return kStreamKinds + (kind == StreamKind::kImage ? 0 : kCameraQueues - 1) + further;
 }
 
 std::size_t StreamMerger::queue_of(const Measurement& measurement) {
-  const auto* image = std::get_if<ImageMeasurement>(&measurement);
-  return queue_of(kind_of(measurement), image == nullptr ? 0 : image->camera);
+  return queue_of(kind_of(measurement), camera_of(measurement));
 }
 
 void StreamMerger::await(StreamKind kind, int camera) {

@@ -47,7 +47,7 @@ class StreamMerger {
   /// Takes a sample. It must have a time; @throws std::invalid_argument when it has none.
   void push(Measurement measurement);
   /// The next sample in time order that may leave. Of samples that wait with equal times: magnetometer, image (by
-  /// camera), GPS, reference, IMU, so that an IMU step finds what belongs to its time.
+  /// camera), features (by camera), GPS, odometry, reference, IMU, so that an IMU step finds what belongs to its time.
   std::optional<Measurement> pop();
   /// From here on pop() gives all that waits (end of the recording).
   void finish();
@@ -64,9 +64,9 @@ class StreamMerger {
     bool stepped_back = false;  // its time did, and what came since was late
     int late_in_a_row = 0;      // since then
   };
-  // Cameras share times, so each has a queue of its own; those past the last share it.
+  // Cameras share times, so each has queues of its own for images and features; those past the last share it.
   static constexpr std::size_t kCameraQueues = 8;
-  static constexpr std::size_t kQueues = kStreamKinds + kCameraQueues - 1;
+  static constexpr std::size_t kQueues = kStreamKinds + 2 * (kCameraQueues - 1);
   struct Suspect {
     Measurement measurement;
     int others = 0;  // samples since that know nothing of its time

@@ -49,17 +49,43 @@ struct ReferenceArrays {
 struct GpsArrays {
   py::array_t<loc::TimeNs> times_ns;
   py::array_t<double> latitude_longitude_altitude;
+  py::array_t<double> position_cov;
   py::array_t<double> velocity_enu;
+  py::array_t<double> velocity_cov;
   py::array_t<std::int8_t> fix;
+};
+struct OdometryArrays {
+  py::array_t<loc::TimeNs> times_ns;
+  py::array_t<loc::TimeNs> start_times_ns;
+  py::array_t<double> position;
+  py::array_t<double> q_wxyz;
+  py::array_t<double> position_cov;
+  py::array_t<double> orientation_cov;
+};
+struct FeaturesArrays {
+  py::array_t<loc::TimeNs> times_ns;
+  py::array_t<std::int32_t> camera;
+  py::array_t<double> sigma_px;
+  py::array_t<std::int64_t> first;
+  py::array_t<std::int64_t> id;
+  py::array_t<double> pixel_px;
 };
 struct Recording {
   ImuArrays imu;
   MagnetometerArrays magnetometer;
   ReferenceArrays reference;
   GpsArrays gps;
+  OdometryArrays odometry;
+  FeaturesArrays features;
   std::int64_t images = 0;
   std::map<std::string, std::int64_t> counts;
 };
+
+/// (N, 3, 3) of the rows of N matrices.
+py::array_t<double> matrices(std::vector<double>&& values) {
+  const auto n = static_cast<py::ssize_t>(values.size()) / 9;
+  return hand_over(std::move(values)).reshape({n, py::ssize_t{3}, py::ssize_t{3}});
+}
 
 Recording read_all(MeasurementSource& source) {
   Columns columns;
@@ -83,8 +109,17 @@ Recording read_all(MeasurementSource& source) {
                    hand_over(std::move(r.position), 3), hand_over(std::move(r.velocity), 3),
                    py::array_t<bool>(hand_over(std::move(r.score)).attr("view")("bool"))};
   auto& g = columns.gps;
-  out.gps = {hand_over(std::move(g.times_ns)), hand_over(std::move(g.latitude_longitude_altitude), 3),
-             hand_over(std::move(g.velocity_enu), 3), hand_over(std::move(g.fix))};
+  out.gps = {hand_over(std::move(g.times_ns)),    hand_over(std::move(g.latitude_longitude_altitude), 3),
+             matrices(std::move(g.position_cov)), hand_over(std::move(g.velocity_enu), 3),
+             matrices(std::move(g.velocity_cov)), hand_over(std::move(g.fix))};
+  auto& o = columns.odometry;
+  out.odometry = {hand_over(std::move(o.times_ns)),    hand_over(std::move(o.start_times_ns)),
+                  hand_over(std::move(o.position), 3), hand_over(std::move(o.q_wxyz), 4),
+                  matrices(std::move(o.position_cov)), matrices(std::move(o.orientation_cov))};
+  auto& f = columns.features;
+  out.features = {hand_over(std::move(f.times_ns)), hand_over(std::move(f.camera)),
+                  hand_over(std::move(f.sigma_px)), hand_over(std::move(f.first)),
+                  hand_over(std::move(f.id)),       hand_over(std::move(f.pixel_px), 2)};
   out.images = columns.images;
   out.counts = as_map(counts);
   return out;
@@ -107,13 +142,34 @@ void bind_recording(py::module_& m) {
   py::class_<GpsArrays>(m, "GpsArrays", "GPS fixes, empty when there are none; NaN where the receiver did not say.")
       .def_readonly("times_ns", &GpsArrays::times_ns, "(N,) int64")
       .def_readonly("latitude_longitude_altitude", &GpsArrays::latitude_longitude_altitude, "(N, 3) [rad, rad, m]")
+      .def_readonly("position_cov", &GpsArrays::position_cov, "(N, 3, 3) [m^2], east, north, up")
       .def_readonly("velocity_enu", &GpsArrays::velocity_enu, "(N, 3) [m/s]")
+      .def_readonly("velocity_cov", &GpsArrays::velocity_cov, "(N, 3, 3) [m^2/s^2]")
       .def_readonly("fix", &GpsArrays::fix, "(N,) int8, GpsFixType");
+  py::class_<OdometryArrays>(m, "OdometryArrays", "Odometry, empty when there is none; lengths in its own unit.")
+      .def_readonly("times_ns", &OdometryArrays::times_ns, "(N,) int64")
+      .def_readonly("start_times_ns", &OdometryArrays::start_times_ns,
+                    "(N,) int64, from when a relative pose counts; the smallest int64 (NO_TIME): absolute")
+      .def_readonly("position", &OdometryArrays::position, "(N, 3) [odometry's unit]")
+      .def_readonly("q_wxyz", &OdometryArrays::q_wxyz, "(N, 4), takes body to world, or to body at the start")
+      .def_readonly("position_cov", &OdometryArrays::position_cov, "(N, 3, 3) [unit^2]")
+      .def_readonly("orientation_cov", &OdometryArrays::orientation_cov, "(N, 3, 3) [rad^2], axes of body");
+  py::class_<FeaturesArrays>(m, "FeaturesArrays",
+                             "Features of N frames, empty when there are none. Those of frame i are rows "
+                             "first[i]:first[i + 1] of id and pixel_px.")
+      .def_readonly("times_ns", &FeaturesArrays::times_ns, "(N,) int64")
+      .def_readonly("camera", &FeaturesArrays::camera, "(N,) int32, index of the camera in the rig")
+      .def_readonly("sigma_px", &FeaturesArrays::sigma_px, "(N,), deviation of one coordinate; NaN when unknown")
+      .def_readonly("first", &FeaturesArrays::first, "(N + 1,) int64")
+      .def_readonly("id", &FeaturesArrays::id, "(M,) int64, the same for the same point of the scene")
+      .def_readonly("pixel_px", &FeaturesArrays::pixel_px, "(M, 2), u and v in the distorted image");
   py::class_<Recording>(m, "Recording", "A whole recording as arrays.")
       .def_readonly("imu", &Recording::imu)
       .def_readonly("magnetometer", &Recording::magnetometer)
       .def_readonly("reference", &Recording::reference)
       .def_readonly("gps", &Recording::gps)
+      .def_readonly("odometry", &Recording::odometry)
+      .def_readonly("features", &Recording::features)
       .def_readonly("images", &Recording::images, "How many pictures there were; iterate over a source to get them.")
       .def_readonly("counts", &Recording::counts, "What was read and what was skipped, and why.");
 }
@@ -150,11 +206,14 @@ void bind_sources(py::module_& m) {
           "What was read and what was skipped, and why: {name: number}.");
   m.def(
       "open_euroc",
-      [](const fs::path& folder, bool reference, bool magnetometer) {
-        return loc::open_euroc(folder, {.read_reference = reference, .read_magnetometer = magnetometer});
+      [](const fs::path& folder, bool reference, bool magnetometer, bool gps, bool odometry) {
+        return loc::open_euroc(folder, {.read_reference = reference,
+                                        .read_magnetometer = magnetometer,
+                                        .read_gps = gps,
+                                        .read_odometry = odometry});
       },
       py::arg("folder"), py::kw_only(), py::arg("reference") = true, py::arg("magnetometer") = true,
-      "A EuRoC / ASL recording: the folder that holds mav0.");
+      py::arg("gps") = true, py::arg("odometry") = true, "A EuRoC / ASL recording: the folder that holds mav0.");
   m.def(
       "open_csv",
       [](const fs::path& path, const std::string& time_unit, const std::string& angular_velocity_unit,
@@ -168,7 +227,8 @@ void bind_sources(py::module_& m) {
       py::arg("path"), py::kw_only(), py::arg("time_unit") = "", py::arg("angular_velocity_unit") = "",
       py::arg("specific_force_unit") = "", py::arg("magnetic_field_unit") = "", py::arg("tesla_per_unit") = 0.0,
       "A CSV file whose first line names columns and units: time_ns or \"t [s]\", wx wy wz, ax ay az, mx my mz, "
-      "qw qx qy qz, px py pz ... The units given here are for headings that have none.");
+      "qw qx qy qz, px py pz, latitude longitude altitude, odo_px odo_py odo_pz ... The units given here are for "
+      "headings that have none.");
   m.def(
       "open_broad",
       [](const fs::path& path, bool reference) {

@@ -34,11 +34,11 @@ TypeEntry entry() {
           [](std::span<const std::uint8_t> data) { static_cast<void>(loc::decode_message<T>(data)); }};
 }
 
-const std::array<TypeEntry, 11>& types() {
-  static const std::array<TypeEntry, 11> all = {
+const std::array<TypeEntry, 12>& types() {
+  static const std::array<TypeEntry, 12> all = {
       entry<loc::imu_t>(),        entry<loc::magnetometer_t>(),  entry<loc::image_t>(),  entry<loc::gps_fix_t>(),
       entry<loc::reference_t>(),  entry<loc::estimate_t>(),      entry<loc::tracks_t>(), entry<loc::map_points_t>(),
-      entry<loc::statistics_t>(), entry<loc::source_status_t>(), entry<loc::clock_t>()};
+      entry<loc::statistics_t>(), entry<loc::source_status_t>(), entry<loc::clock_t>(),  entry<loc::odometry_t>()};
   return all;
 }
 
@@ -78,6 +78,8 @@ void bind_msgs(py::module_& m) {
   m.attr("MAGNETOMETER_CHANNEL") = loc::default_channel(loc::StreamKind::kMagnetometer);
   m.attr("IMAGE_CHANNEL") = loc::default_channel(loc::StreamKind::kImage);
   m.attr("GPS_CHANNEL") = loc::default_channel(loc::StreamKind::kGps);
+  m.attr("ODOMETRY_CHANNEL") = loc::default_channel(loc::StreamKind::kOdometry);
+  m.attr("TRACKS_CHANNEL") = loc::default_channel(loc::StreamKind::kFeatures);
   m.attr("REFERENCE_CHANNEL") = loc::default_channel(loc::StreamKind::kReference);
 }
 

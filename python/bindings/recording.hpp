@@ -46,8 +46,27 @@ struct ReferenceColumns {
 struct GpsColumns {
   std::vector<loc::TimeNs> times_ns;
   std::vector<double> latitude_longitude_altitude;
+  std::vector<double> position_cov;  // rows of the matrices, one after the other
   std::vector<double> velocity_enu;
+  std::vector<double> velocity_cov;
   std::vector<std::int8_t> fix;
+};
+
+struct OdometryColumns {
+  std::vector<loc::TimeNs> times_ns;
+  std::vector<loc::TimeNs> start_times_ns;
+  std::vector<double> position;
+  std::vector<double> q_wxyz;
+  std::vector<double> position_cov;  // rows of the matrices, one after the other
+  std::vector<double> orientation_cov;
+};
+struct FeaturesColumns {
+  std::vector<loc::TimeNs> times_ns;
+  std::vector<std::int32_t> camera;
+  std::vector<double> sigma_px;
+  std::vector<std::int64_t> first{0};  // of each frame in the arrays below, and one past the last
+  std::vector<std::int64_t> id;
+  std::vector<double> pixel_px;
 };
 
 struct Columns {
@@ -55,6 +74,8 @@ struct Columns {
   MagnetometerColumns magnetometer;
   ReferenceColumns reference;
   GpsColumns gps;
+  OdometryColumns odometry;
+  FeaturesColumns features;
   std::int64_t images = 0;
 
   void add(const loc::Measurement& measurement);

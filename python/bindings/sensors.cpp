@@ -14,6 +14,7 @@ namespace {
 
 using loc::CameraCalibration;
 using loc::ClockCalibration;
+using loc::FeaturesMeasurement;
 using loc::GpsCalibration;
 using loc::GpsMeasurement;
 using loc::ImageMeasurement;
@@ -22,6 +23,7 @@ using loc::ImuMeasurement;
 using loc::ImuNoise;
 using loc::MagnetometerCalibration;
 using loc::MagnetometerMeasurement;
+using loc::OdometryMeasurement;
 using loc::ReferenceMeasurement;
 using loc::Rig;
 using loc::Stamp;
@@ -143,6 +145,60 @@ void bind_measurements(py::module_& m) {
       .def_property_readonly(
           "velocity_cov", [](const GpsMeasurement& self) { return to_matrix_array(self.velocity_cov); },
           "(3, 3) [m^2/s^2]");
+
+  py::class_<OdometryMeasurement> odometry(
+      m, "OdometryMeasurement",
+      "Pose by an odometry that knows no metre, in its own unit: length = scale * metres. What is not known is NaN.");
+  odometry.def(py::init([](loc::TimeNs time_ns, const ArrayLike& position, const ArrayLike& q,
+                           std::optional<loc::TimeNs> start_time_ns, const std::optional<ArrayLike>& position_cov,
+                           const std::optional<ArrayLike>& orientation_cov) {
+                 auto out = stamped<OdometryMeasurement>(time_ns);
+                 out.position = vector3(position, "position");
+                 const Eigen::Vector4d wxyz = matrix(q, "q_wxyz", 4, 1);
+                 out.rotation = Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+                 out.start_time_ns = start_time_ns.value_or(loc::kNoTime);
+                 if (position_cov) out.position_cov = matrix(*position_cov, "position_cov", 3, 3);
+                 if (orientation_cov) out.orientation_cov = matrix(*orientation_cov, "orientation_cov", 3, 3);
+                 return out;
+               }),
+               py::arg("time_ns"), py::arg("position"), py::arg("q_wxyz"), py::kw_only(),
+               py::arg("start_time_ns") = py::none(), py::arg("position_cov") = py::none(),
+               py::arg("orientation_cov") = py::none());
+  stamp_properties(odometry);
+  odometry
+      .def_property_readonly(
+          "start_time_ns", [](const OdometryMeasurement& self) { return optional_time(self.start_time_ns); },
+          "None: absolute, pose of body in world. Otherwise pose of body in the axes of body at this time.")
+      .def_property_readonly("q_wxyz", [](const OdometryMeasurement& self) { return to_wxyz(self.rotation); });
+  vector_property(odometry, "position", &OdometryMeasurement::position, "(3,) [odometry's unit]");
+  matrix_property(odometry, "position_cov", &OdometryMeasurement::position_cov, "(3, 3) [unit^2], axes of position");
+  matrix_property(odometry, "orientation_cov", &OdometryMeasurement::orientation_cov,
+                  "(3, 3) [rad^2], axes of body at time_ns");
+
+  py::class_<FeaturesMeasurement> features(m, "FeaturesMeasurement",
+                                           "The features of one frame with their identities.");
+  stamp_properties(features);
+  features.def_readonly("camera", &FeaturesMeasurement::camera, "index of the camera in the rig")
+      .def_readonly("sigma_px", &FeaturesMeasurement::sigma_px, "deviation of one coordinate; NaN when unknown")
+      .def_property_readonly(
+          "id",
+          [](const FeaturesMeasurement& self) {
+            py::array_t<std::int64_t> out(static_cast<py::ssize_t>(self.features.size()));
+            for (std::size_t i = 0; i < self.features.size(); ++i) out.mutable_data()[i] = self.features[i].id;
+            return out;
+          },
+          "(M,) int64, the same for the same point of the scene")
+      .def_property_readonly(
+          "pixel_px",
+          [](const FeaturesMeasurement& self) {
+            py::array_t<double> out({static_cast<py::ssize_t>(self.features.size()), py::ssize_t{2}});
+            for (std::size_t i = 0; i < self.features.size(); ++i) {
+              out.mutable_data()[2 * i] = self.features[i].pixel_px.x();
+              out.mutable_data()[2 * i + 1] = self.features[i].pixel_px.y();
+            }
+            return out;
+          },
+          "(M, 2), u and v in the distorted image");
 
   py::class_<ImageMeasurement> image(m, "ImageMeasurement", "One picture, raw or JPEG.");
   stamp_properties(image);

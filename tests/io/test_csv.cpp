@@ -119,6 +119,72 @@ TEST_F(Csv, reads_a_reference) {
   expect_error("time_s,px,py,pz,score\n1,1,2,3,2\n", {"a.csv:2", "score"});
 }
 
+TEST_F(Csv, reads_gps_fixes) {
+  const auto all = read(
+      "time_s,latitude_deg,longitude [deg],altitude_m,ve_m_s,vn_m_s,vu_m_s,sigma_e_m,sigma_n,sigma_u [m],"
+      "sigma_ve_m_s,sigma_vn,sigma_vu,fix,satellites\n"
+      "1,45,-180,300,1,2,3,1.5,2,4,0.1,0.2,0.3,6,17\n2,-90,0,,,,,,,,,,,,\n3,,,,,,,,,,,,,0,\n"
+      "4,nan,nan,nan,1,2,3,,,,,,,,\n");
+  const auto gps = only<GpsMeasurement>(all);
+  ASSERT_EQ(gps.size(), 3U);
+  EXPECT_DOUBLE_EQ(gps[0].latitude, std::numbers::pi / 4);
+  EXPECT_DOUBLE_EQ(gps[0].longitude, -std::numbers::pi);
+  EXPECT_EQ(gps[0].altitude, 300);
+  EXPECT_EQ(gps[0].velocity_enu, Eigen::Vector3d(1, 2, 3));
+  EXPECT_TRUE(gps[0].position_cov == Eigen::Matrix3d(Eigen::Vector3d(2.25, 4, 16).asDiagonal()));
+  EXPECT_NEAR(gps[0].velocity_cov(2, 2), 0.09, 1e-15);
+  EXPECT_EQ(gps[0].fix, GpsFixType::kFixed);
+  EXPECT_EQ(gps[0].satellites, 17);
+  EXPECT_EQ(gps[1].fix, GpsFixType::k2d) << "by its content";
+  EXPECT_TRUE(std::isnan(gps[1].altitude));
+  EXPECT_TRUE(gps[1].position_cov.array().isNaN().all());
+  EXPECT_EQ(gps[1].satellites, -1);
+  EXPECT_EQ(gps[2].fix, GpsFixType::kNone);
+  const auto radians = read("t_s,lat_rad,lon_rad,alt_m\n1,0.7853981633974483,-0.1,5\n");
+  EXPECT_EQ(only<GpsMeasurement>(radians).at(0).latitude, 0.7853981633974483) << "to the bit";
+  EXPECT_EQ(only<GpsMeasurement>(radians).at(0).fix, GpsFixType::k3d);
+  expect_error("t_s,lat_rad,lon_rad\n1,45,0\n", {"a.csv:2", "lat_rad", "45", "90 degrees"});
+  expect_error("t_s,lat_deg,lon_deg\n1,45,400\n", {"a.csv:2", "lon_deg", "400"});
+  expect_error("t_s,lat_deg,lon_deg,sigma_e,sigma_n,sigma_u\n1,45,0,1,-1,1\n", {"a.csv:2", "sigma_n", "negative"});
+  expect_error("t_s,lat_deg,lon_deg,fix\n1,45,0,7\n", {"a.csv:2", "fix", "7", "[0, 6]"});
+  expect_error("t_s,lat_deg,lon_deg,satellites\n1,45,0,8.5\n", {"a.csv:2", "satellites", "8.5"});
+  expect_error("t_s,lat_deg,lon_deg\n1,45,\n", {"a.csv:2", "lat_deg", "empty"});
+  expect_error("t_s,lat,lon\n1,45,0\n", {"a.csv:1", "lat", "rad, deg"});
+}
+
+TEST_F(Csv, reads_odometry) {
+  const auto all = read(
+      "time_ns,odo_start [ns],odo_px,odo_py,odo_pz [unit],odo_qw,odo_qx,odo_qy,odo_qz,odo_sigma_px_m,odo_sigma_py,"
+      "odo_sigma_pz,odo_sigma_theta_x_deg,odo_sigma_theta_y [rad],odo_sigma_theta_z_rad\n"
+      "1403715274302142975,,1,2,3,0.7072,0,0,0.7072,1,2,3,180,0.5,1\n"
+      "1403715274402142975,1403715274302142975,0.1,0,0,1,0,0,0,,,,,,\n1403715274502142975,,1,1,1,,,,,,,,,,\n");
+  const auto odometry = only<OdometryMeasurement>(all);
+  ASSERT_EQ(odometry.size(), 3U);
+  EXPECT_EQ(odometry[0].start_time_ns, kNoTime) << "absolute";
+  EXPECT_EQ(odometry[0].position, Eigen::Vector3d(1, 2, 3));
+  EXPECT_NEAR(odometry[0].rotation.z(), std::sqrt(0.5), 1e-15);
+  EXPECT_TRUE(odometry[0].position_cov == Eigen::Matrix3d(Eigen::Vector3d(1, 4, 9).asDiagonal()));
+  EXPECT_NEAR(odometry[0].orientation_cov(0, 0), std::numbers::pi * std::numbers::pi, 1e-14);
+  EXPECT_EQ(odometry[1].start_time_ns, 1403715274302142975) << "exact";
+  EXPECT_TRUE(odometry[1].position_cov.array().isNaN().all());
+  EXPECT_TRUE(odometry[2].rotation.coeffs().array().isNaN().all());
+  const std::string heading = "t_s,odo_start_s,odo_px,odo_py,odo_pz,odo_qw,odo_qx,odo_qy,odo_qz\n";
+  expect_error(heading + "5,5,0,0,0,1,0,0,0\n", {"a.csv:2", "odo_start", "before"});
+  expect_error(heading + "5,x,0,0,0,1,0,0,0\n", {"a.csv:2", "odo_start", "'x'", "time"});
+  expect_error(heading + "5,4,0,0,0,2,0,0,0\n", {"a.csv:2", "odometry quaternion", "norm 2"});
+  expect_error("t_s,odo_px_km,odo_py,odo_pz\n", {"odo_px_km", "km", "unit, m"});
+}
+
+TEST_F(Csv, streams_of_one_row_come_in_the_order_of_equal_times) {
+  const auto all = read(
+      "time_s,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2,mx_ut,my_ut,mz_ut,px,py,pz,lat_deg,lon_deg,odo_px,"
+      "odo_py,odo_pz\n1,1,2,3,4,5,6,7,8,9,1,2,3,45,5,1,2,3\n");
+  std::vector<StreamKind> kinds;
+  for (const Measurement& m : all) kinds.push_back(kind_of(m));
+  EXPECT_EQ(kinds, (std::vector<StreamKind>{StreamKind::kMagnetometer, StreamKind::kGps, StreamKind::kOdometry,
+                                            StreamKind::kReference, StreamKind::kImu}));
+}
+
 TEST_F(Csv, bad_headings_are_told) {
   expect_error("time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,temperature\n",
                {"a.csv:1", "temperature", "known are"});
@@ -131,6 +197,11 @@ TEST_F(Csv, bad_headings_are_told) {
   expect_error("time_ns,px,py,pz,qw [m],qx,qy,qz\n", {"qw [m]", "no unit"});
   expect_error("time_ns,mx [arb],my [arb],mz [arb]\n1,2,3,4\n", {"mx [arb]", "tesla"});
   expect_error("time_ns [ns,px,py,pz\n", {"bracket"});
+  expect_error("time_ns,px,py,pz,altitude\n", {"altitude without latitude"});
+  expect_error("time_ns,lat_deg,lon_deg,sigma_ve,sigma_vn,sigma_vu\n", {"without ve vn vu"});
+  expect_error("time_ns,px,py,pz,odo_start_ns\n", {"odo_start without odo_px"});
+  expect_error("time_ns,odo_px,odo_py,odo_pz,odo_sigma_theta_x,odo_sigma_theta_y,odo_sigma_theta_z\n",
+               {"'odo_sigma_theta_x'", "no unit", "rad, deg"});
 }
 
 TEST_F(Csv, bad_files_are_told) {

@@ -68,6 +68,27 @@ TEST_F(Euroc, reads_a_magnetometer) {
               1e-18);
 }
 
+TEST_F(Euroc, reads_gps_and_odometry_beside_it) {
+  folder_.write("r/mav0/gps0/data.csv",
+                "#timestamp [ns],latitude [deg],longitude [deg],altitude [m]\n1403715273267143168,45,6,300\n");
+  folder_.write("r/mav0/odometry0/data.csv",
+                "#timestamp [ns],odo_px [unit],odo_py [unit],odo_pz [unit]\n1403715273267143168,1,2,3\n"
+                "1403715273272142848,2,3,4\n");
+  const auto source = open_euroc(recording());
+  const auto all = read_all(*source);
+  ASSERT_EQ(all.size(), 7U);
+  EXPECT_TRUE(std::holds_alternative<GpsMeasurement>(all[1])) << "the order of equal times";
+  EXPECT_TRUE(std::holds_alternative<OdometryMeasurement>(all[2]));
+  EXPECT_TRUE(std::holds_alternative<ReferenceMeasurement>(all[3]));
+  EXPECT_EQ(std::get<OdometryMeasurement>(all[5]).position, Eigen::Vector3d(2, 3, 4));
+  EXPECT_EQ(stamp_of(all[5]).sequence, 1);
+  EXPECT_EQ(count(source->counts(), "gps.read"), 1);
+  EXPECT_EQ(count(source->counts(), "odometry.read"), 2);
+  EXPECT_EQ(read_all(*open_euroc(recording(), {.read_gps = false, .read_odometry = false})).size(), 4U);
+  folder_.write("r/mav0/gps0/data.csv", kReference);
+  expect_data_error([&] { open_euroc(recording()); }, {"gps0/data.csv", "no columns of gps"});
+}
+
 TEST_F(Euroc, what_is_missing_or_wrong_is_told) {
   expect_data_error([&] { open_euroc(folder_.path() / "none"); }, {"none", "no such folder"});
   expect_data_error([&] { open_euroc(folder_.path()); }, {"imu0/data.csv", "no such file"});

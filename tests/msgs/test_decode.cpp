@@ -35,6 +35,8 @@ TEST(DecodeMessage, gives_back_every_type_of_the_package) {
   check(to_message(test::gps_sample()));
   check(to_message(test::reference_sample()));
   check(to_message(test::magnetometer_sample()));
+  check(to_message(test::odometry_sample()));
+  check(to_message(test::features_sample()));
 }
 
 template <class T>
@@ -57,6 +59,8 @@ TEST(DecodeMessage, refuses_a_message_cut_at_any_byte_or_with_a_byte_too_many) {
   expect_cut_or_longer_is_refused(test::statistics_message());
   expect_cut_or_longer_is_refused(test::source_status_message());
   expect_cut_or_longer_is_refused(test::clock_message());
+  expect_cut_or_longer_is_refused(to_message(test::odometry_sample()));
+  expect_cut_or_longer_is_refused(to_message(test::features_sample()));
 }
 
 // Every int32 of the message in turn becomes a length that no message has: nothing may be allocated for it, nothing
@@ -115,6 +119,10 @@ TEST(MeasurementDecoder, decodes_the_default_channels) {
       std::holds_alternative<GpsMeasurement>(*decoder.decode("LOC_GPS", encode(to_message(test::gps_sample())))));
   EXPECT_TRUE(std::holds_alternative<ReferenceMeasurement>(
       *decoder.decode("LOC_REFERENCE", encode(to_message(test::reference_sample())))));
+  EXPECT_TRUE(std::holds_alternative<OdometryMeasurement>(
+      *decoder.decode("LOC_ODOMETRY", encode(to_message(test::odometry_sample())))));
+  EXPECT_TRUE(std::holds_alternative<FeaturesMeasurement>(
+      *decoder.decode("LOC_TRACKS", encode(to_message(test::features_sample())))));
   EXPECT_TRUE(decoder.counts().empty());
 }
 
@@ -188,12 +196,28 @@ TEST(MeasurementDecoder, pictures_come_on_several_channels) {
   EXPECT_TRUE(decoder.decode("right", image));
 }
 
+TEST(MeasurementDecoder, so_do_features_but_odometry_is_one_stream) {
+  const Bytes features = encode(to_message(test::features_sample()));
+  const Bytes odometry = encode(to_message(test::odometry_sample()));
+  MeasurementDecoder decoder;
+  EXPECT_TRUE(decoder.decode("left", features));
+  EXPECT_TRUE(decoder.decode("right", features));
+  EXPECT_TRUE(decoder.decode("vo", odometry));
+  EXPECT_FALSE(decoder.decode("wheels", odometry));
+  ASSERT_EQ(decoder.counts().size(), 1U);
+  EXPECT_EQ(decoder.counts()[0].name, "odometry.skipped.other_channel");
+}
+
 TEST(MeasurementDecoder, survives_random_damage) {
   Random random(20);
   const std::vector<std::pair<std::string, Bytes>> good{
-      {"LOC_IMU", encode(to_message(test::imu_sample()))},   {"LOC_IMAGE", encode(to_message(test::image_sample()))},
-      {"LOC_GPS", encode(to_message(test::gps_sample()))},   {"/imu", encode(test::aspn_imu(1'000'000'000, 1))},
+      {"LOC_IMU", encode(to_message(test::imu_sample()))},
+      {"LOC_IMAGE", encode(to_message(test::image_sample()))},
+      {"LOC_GPS", encode(to_message(test::gps_sample()))},
+      {"/imu", encode(test::aspn_imu(1'000'000'000, 1))},
       {"/pva", encode(test::aspn_pva(1'000'000'000, true))},
+      {"LOC_ODOMETRY", encode(to_message(test::odometry_sample()))},
+      {"LOC_TRACKS", encode(to_message(test::features_sample()))},
   };
   MeasurementDecoder decoder;
   int refused = 0;

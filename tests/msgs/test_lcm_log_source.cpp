@@ -27,10 +27,14 @@ TEST_F(LogSource, gives_every_stream_with_the_time_of_its_messages) {
   writer.write(2, "LOC_GPS", encode(to_message(test::gps_sample())));
   writer.write(3, "LOC_IMU", encode(to_message(test::imu_sample(2000, 1))));
   writer.write(4, "LOC_ESTIMATE", encode(test::estimate_message()));
+  writer.write(5, "LOC_ODOMETRY", encode(to_message(test::odometry_sample())));
+  writer.write(6, "LOC_TRACKS", encode(to_message(test::features_sample())));
   writer.flush();
   const auto source = open_lcm_log(file());
   const auto all = read_all(*source);
-  ASSERT_EQ(all.size(), 3U);
+  ASSERT_EQ(all.size(), 5U);
+  EXPECT_EQ(count(source->counts(), "odometry.read"), 1);
+  EXPECT_EQ(count(source->counts(), "features.read"), 1);
   EXPECT_EQ(stamp_of(all[0]).time_ns, 1000);
   EXPECT_EQ(count(source->counts(), "imu.read"), 2);
   EXPECT_EQ(count(source->counts(), "gps.read"), 1);

@@ -32,6 +32,7 @@ TEST(Messages, FingerprintsAreFrozen) {
   EXPECT_EQ(hash(map_points_t::getHash()), 0xcff528ac74639d5fU);
   EXPECT_EQ(hash(statistics_t::getHash()), 0x2f2b80d43dc8bfd9U);
   EXPECT_EQ(hash(source_status_t::getHash()), 0xd63ab9362bc56f14U);
+  EXPECT_EQ(hash(odometry_t::getHash()), 0x1157247bdae507a3U);
   EXPECT_EQ(hash(clock_t::getHash()), 0xafbc08ec99f516dbU);
 }
 
@@ -169,6 +170,60 @@ TEST(Messages, ReferenceRoundTripKeepsTheOrderOfTheQuaternion) {
   EXPECT_EQ(back.position, reference.position);
   EXPECT_EQ(back.velocity, reference.velocity);
   EXPECT_FALSE(back.score);
+}
+
+TEST(Messages, OdometryRoundTripKeepsOrdersAndWhetherItIsRelative) {
+  OdometryMeasurement odometry;
+  Random random(9);
+  fill_stamp(random, odometry);
+  odometry.start_time_ns = odometry.time_ns - 5;
+  odometry.position = any_vector(random);
+  odometry.rotation = Eigen::Quaterniond(0.1, 0.2, 0.3, 0.4).normalized();
+  odometry.position_cov = any_matrix(random);
+  odometry.orientation_cov = any_matrix(random);
+  const odometry_t message = over_the_wire(to_message(odometry));
+  EXPECT_EQ(message.q_wxyz[0], odometry.rotation.w());
+  EXPECT_EQ(message.position_cov[0][2], odometry.position_cov(0, 2));
+  const OdometryMeasurement back = from_message(message);
+  expect_same_stamp(odometry, back);
+  EXPECT_EQ(back.start_time_ns, odometry.start_time_ns);
+  EXPECT_EQ(back.position, odometry.position);
+  EXPECT_EQ(back.rotation.coeffs(), odometry.rotation.coeffs());
+  EXPECT_EQ(back.position_cov, odometry.position_cov);
+  EXPECT_EQ(back.orientation_cov, odometry.orientation_cov);
+
+  odometry.start_time_ns = kNoTime;
+  EXPECT_EQ(from_message(over_the_wire(to_message(odometry))).start_time_ns, kNoTime);
+  const OdometryMeasurement nothing = from_message(over_the_wire(to_message([] {
+    OdometryMeasurement empty;
+    empty.time_ns = 1;
+    return empty;
+  }())));
+  EXPECT_TRUE(nothing.rotation.coeffs().array().isNaN().all()) << "an odometry of positions only";
+  EXPECT_TRUE(nothing.position_cov.array().isNaN().all());
+}
+
+TEST(Messages, FeaturesRoundTrip) {
+  FeaturesMeasurement features;
+  Random random(10);
+  fill_stamp(random, features);
+  features.camera = 3;
+  features.sigma_px = 0.75;
+  for (int i = 0; i < 1000; ++i) {
+    features.features.push_back({1'000'000'000'000 - 7 * i, {random.uniform(-1, 800), random.uniform(-1, 600)}});
+  }
+  const FeaturesMeasurement back = from_message(over_the_wire(to_message(features)));
+  expect_same_stamp(features, back);
+  EXPECT_EQ(back.camera, 3);
+  EXPECT_EQ(back.sigma_px, 0.75);
+  ASSERT_EQ(back.features.size(), features.features.size());
+  for (std::size_t i = 0; i < back.features.size(); ++i) {
+    EXPECT_EQ(back.features[i].id, features.features[i].id);
+    EXPECT_EQ(back.features[i].pixel_px, features.features[i].pixel_px);
+  }
+  features.features.clear();
+  EXPECT_TRUE(from_message(over_the_wire(to_message(features))).features.empty())
+      << "a frame in which nothing was seen";
 }
 
 TEST(Messages, EstimateRoundTripWithCovariance) {
@@ -350,6 +405,30 @@ TEST(Messages, RefusesWhatNoSensorCanHaveSent) {
   gps_fix_t fix{};
   fix.fix_type = 9;
   expect_data_error([&] { from_message(fix); }, "fix_type");
+
+  OdometryMeasurement odometry;
+  odometry.time_ns = 100;
+  odometry.rotation.setIdentity();
+  const odometry_t relative = to_message(odometry);
+  expect_data_error([&] { from_message(changed(relative, [](odometry_t& m) { m.start_time_ns = 100; })); },
+                    "odometry_t.start_time_ns = 100: must be before time_ns");
+  expect_data_error([&] { from_message(changed(relative, [](odometry_t& m) { m.q_wxyz[0] = 0.5; })); },
+                    "odometry_t.q_wxyz: norm = 0.5");
+  expect_data_error([&] { from_message(changed(relative, [](odometry_t& m) { m.time_ns = kNoTime; })); },
+                    "odometry_t.time_ns");
+
+  FeaturesMeasurement features;
+  features.time_ns = 1;
+  features.features = {{4, {1, 2}}, {5, {3, 4}}};
+  const tracks_t tracks = to_message(features);
+  EXPECT_TRUE(std::isnan(from_message(tracks).sigma_px));
+  expect_data_error([&] { from_message(changed(tracks, [](tracks_t& m) { m.camera = -1; })); }, "tracks_t.camera = -1");
+  expect_data_error([&] { from_message(changed(tracks, [](tracks_t& m) { m.sigma_px = -0.5; })); },
+                    "tracks_t.sigma_px = -0.5");
+  expect_data_error([&] { from_message(changed(tracks, [](tracks_t& m) { m.size = 3; })); }, "tracks_t.size = 3");
+  expect_data_error([&] { from_message(changed(tracks, [](tracks_t& m) { m.u_px.pop_back(); })); }, "tracks_t.size");
+  expect_data_error([&] { from_message(changed(tracks, [](tracks_t& m) { m.feature_id[1] = 4; })); },
+                    "tracks_t.feature_id = 4: comes twice");
 
   estimate_t estimate{};
   estimate.time_ns = 1;

@@ -20,6 +20,7 @@ FINGERPRINTS = {
     "imu_t": 0x6E15AF9AA7F2F0BD,
     "magnetometer_t": 0x939B1E83F8A696D2,
     "map_points_t": 0xCFF528AC74639D5F,
+    "odometry_t": 0x1157247BDAE507A3,
     "reference_t": 0x120581A61696AE36,
     "source_status_t": 0xD63AB9362BC56F14,
     "statistics_t": 0x2F2B80D43DC8BFD9,
@@ -137,3 +138,53 @@ def test_damage_is_reported(tmp_path):
         list(LogReader(broken))
     with pytest.raises(DataError, match="absent"):
         LogReader(tmp_path / "absent")
+
+
+def test_odometry_and_features_as_arrays(tmp_path):
+    path = tmp_path / "a.lcm"
+    odometry = loc.odometry_t()
+    odometry.time_ns, odometry.start_time_ns = 2000, 1000
+    odometry.position, odometry.q_wxyz = [1, 2, 3], [0.5, 0.5, -0.5, 0.5]
+    odometry.position_cov = [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
+    absolute = loc.odometry_t()
+    absolute.time_ns, absolute.start_time_ns, absolute.q_wxyz = 3000, -(2**63), [1, 0, 0, 0]
+    with LogWriter(path) as log:
+        log.write("LOC_ODOMETRY", odometry, log_time_us=1)
+        log.write("LOC_ODOMETRY", absolute, log_time_us=2)
+        for i, ids in enumerate([[7, 5], [], [5, 6, 9]]):
+            tracks = loc.tracks_t()
+            tracks.time_ns, tracks.camera, tracks.sigma_px, tracks.size = 1000 + i, 1, 0.5, len(ids)
+            tracks.feature_id, tracks.u_px, tracks.v_px = ids, [10.0 * k for k in ids], [0.25] * len(ids)
+            log.write("LOC_TRACKS", tracks, log_time_us=3 + i)
+    r = libloc.read_recording(path)
+    assert r.odometry.times_ns.tolist() == [2000, 3000]
+    assert r.odometry.start_times_ns.tolist() == [1000, libloc.NO_TIME]
+    assert r.odometry.position.tolist() == [[1, 2, 3], [0, 0, 0]]
+    assert r.odometry.q_wxyz[0].tolist() == [0.5, 0.5, -0.5, 0.5]
+    assert r.odometry.position_cov[0].tolist() == [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
+    assert r.odometry.orientation_cov.shape == (2, 3, 3)
+    f = r.features
+    assert (f.first.tolist(), f.id.tolist()) == ([0, 2, 2, 5], [7, 5, 5, 6, 9])
+    assert f.pixel_px[f.first[2] : f.first[3]].tolist() == [[50, 0.25], [60, 0.25], [90, 0.25]]
+    assert (f.camera.tolist(), f.sigma_px.tolist()) == ([1] * 3, [0.5] * 3)
+
+    one = list(libloc.open_recording(path))
+    assert (one[0].start_time_ns, one[1].start_time_ns) == (1000, None)
+    assert one[0].position_cov[1, 2] == 6
+    assert one[4].id.tolist() == [5, 6, 9]
+    assert one[4].pixel_px[2].tolist() == [90, 0.25]
+    made = libloc.OdometryMeasurement(5, [1, 2, 3], [1, 0, 0, 0], start_time_ns=4, position_cov=np.eye(3))
+    assert (made.time_ns, made.start_time_ns, made.position_cov[0, 0]) == (5, 4, 1)
+    assert np.isnan(made.orientation_cov).all()
+
+
+def test_features_that_no_tracker_sends_are_counted(tmp_path):
+    path = tmp_path / "a.lcm"
+    tracks = loc.tracks_t()
+    tracks.time_ns, tracks.size = 1, 2
+    tracks.feature_id, tracks.u_px, tracks.v_px = [4, 4], [1, 2], [3, 4]
+    with LogWriter(path) as log:
+        log.write("LOC_TRACKS", tracks, log_time_us=1)
+    r = libloc.read_recording(path)
+    assert r.counts == {"undecodable:LOC_TRACKS": 1}
+    assert (r.features.first.tolist(), r.features.pixel_px.shape) == ([0], (0, 2))

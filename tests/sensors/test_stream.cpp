@@ -37,15 +37,17 @@ Measurement image(TimeNs time_ns, int camera) {
   return m;
 }
 
-int camera_of(const Measurement& m) {
-  const auto* picture = std::get_if<ImageMeasurement>(&m);
-  return picture == nullptr ? 0 : picture->camera;
+Measurement features(TimeNs time_ns, int camera) {
+  FeaturesMeasurement m{};
+  m.time_ns = time_ns;
+  m.camera = camera;
+  return m;
 }
 
 // Everything that tells samples apart.
 using Key = std::tuple<TimeNs, int, int>;
 Key key_of(const Measurement& m) {
-  constexpr std::array<int, kStreamKinds> kOrder = {4, 0, 1, 2, 3};
+  constexpr std::array<int, kStreamKinds> kOrder = {6, 0, 1, 3, 5, 4, 2};
   return {stamp_of(m).time_ns, kOrder[m.index()], camera_of(m)};
 }
 
@@ -68,7 +70,7 @@ std::vector<Key> merge(const std::vector<Measurement>& arrivals, StreamMergerOpt
   return out;
 }
 
-// Five streams with rates of their own, many equal times, two cameras that share theirs.
+// All kinds of streams with rates of their own, many equal times, two cameras that share theirs.
 std::vector<Measurement> recording() {
   std::vector<Measurement> all;
   for (TimeNs t = 0; t < 2 * kSecond; t += 5 * kMs) all.push_back(imu(kEpoch + t));
@@ -77,6 +79,11 @@ std::vector<Measurement> recording() {
     all.push_back(image(kEpoch + t, 0));
     all.push_back(image(kEpoch + t, 1));
   }
+  for (TimeNs t = 0; t < 2 * kSecond; t += 50 * kMs) {
+    all.push_back(features(kEpoch + t, 0));
+    all.push_back(features(kEpoch + t, 1));
+  }
+  for (TimeNs t = 0; t < 2 * kSecond; t += 40 * kMs) all.push_back(sample<OdometryMeasurement>(kEpoch + t));
   for (TimeNs t = 0; t < 2 * kSecond; t += 200 * kMs) all.push_back(sample<GpsMeasurement>(kEpoch + t));
   for (TimeNs t = 0; t < 2 * kSecond; t += 7 * kMs) all.push_back(sample<ReferenceMeasurement>(kEpoch + t));
   return all;

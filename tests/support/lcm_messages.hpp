@@ -81,6 +81,23 @@ inline ReferenceMeasurement reference_sample() {
   return m;
 }
 
+inline OdometryMeasurement odometry_sample() {
+  auto m = stamped<OdometryMeasurement>();
+  m.start_time_ns = m.time_ns - 100'000'000;
+  m.position = {0.1, -0.2, 0.3};
+  m.rotation = Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5);
+  m.position_cov << 1, 2, 3, 4, 5, 6, 7, 8, 9;
+  m.orientation_cov << -1, -2, -3, -4, -5, -6, -7, -8, -9;
+  return m;
+}
+inline FeaturesMeasurement features_sample() {
+  auto m = stamped<FeaturesMeasurement>();
+  m.camera = 2;
+  m.sigma_px = 0.7;
+  m.features = {{11, {1.5, 2.5}}, {7, {-3.25, 480.125}}};
+  return m;
+}
+
 inline estimate_t estimate_message() {
   estimate_t m{};
   m.time_ns = 3;

@@ -121,6 +121,32 @@ TEST(Restamp, reset_of_the_device_loses_nothing_and_steps_nowhere) {
   EXPECT_EQ(test::count(source.counts(), "clock.steps"), 0);
 }
 
+// Poses that join before must join after, though the line moves between samples; one that begins between samples keeps
+// its length.
+TEST(Restamp, start_of_a_relative_odometry_moves_with_its_end) {
+  Recording r = imu_recording(ClockSimulation::usb_imu(), 30);
+  std::vector<TimeNs> device;
+  for (std::size_t i = 0; i < r.source->list.size(); ++i) {
+    OdometryMeasurement odometry;
+    static_cast<Stamp&>(odometry) = stamp_of(r.source->list[i]);
+    if (i > 0) odometry.start_time_ns = i % 7 == 0 ? odometry.time_ns - 2'500'000 : device.back();
+    device.push_back(odometry.time_ns);
+    r.source->list[i] = odometry;
+  }
+  RestampedSource source(std::move(r.source), options_for(TimeBase::kHost));
+  const auto out = test::only<OdometryMeasurement>(test::read_all(source));
+  ASSERT_EQ(out.size(), device.size());
+  EXPECT_EQ(out[0].start_time_ns, kNoTime) << "an absolute one stays absolute";
+  for (std::size_t i = 1; i < out.size(); ++i) {
+    EXPECT_NE(out[i].time_ns, device[i]);
+    if (i % 7 == 0) {
+      EXPECT_EQ(out[i].time_ns - out[i].start_time_ns, 2'500'000) << i;
+    } else {
+      EXPECT_EQ(out[i].start_time_ns, out[i - 1].time_ns) << i;
+    }
+  }
+}
+
 TEST(Restamp, absurd_device_times_are_dropped_and_counted) {
   Recording r = imu_recording(ClockSimulation::usb_imu(), 30);
   for (const std::size_t i : {2000U, 3000U, 4000U}) {

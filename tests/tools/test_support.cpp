@@ -205,6 +205,28 @@ TEST(Pipeline, CountsLossesRepeatsAndRestarts) {
   EXPECT_EQ(value_of(counts, "estimates"), 8);
 }
 
+TEST(SequenceCheck, EachCameraCountsForItself) {
+  SequenceCheck check;
+  for (std::int64_t i = 0; i < 10; ++i) {
+    for (const std::int32_t camera : {0, 1}) {
+      FeaturesMeasurement features;
+      features.camera = camera;
+      features.sequence = camera == 0 ? i : 5 * i;
+      check.see(features);
+    }
+    OdometryMeasurement odometry;
+    odometry.sequence = i == 9 ? 3 : i;
+    check.see(odometry);
+  }
+  EXPECT_EQ(check.counts(StreamKind::kFeatures).received, 20);
+  EXPECT_EQ(check.counts(StreamKind::kFeatures).lost, 9 * 4);
+  EXPECT_EQ(check.counts(StreamKind::kFeatures).restarts, 0);
+  EXPECT_EQ(check.counts(StreamKind::kOdometry).restarts, 1);
+  EXPECT_EQ(check.last(StreamKind::kOdometry), 3);
+  EXPECT_EQ(SequenceCheck().last(StreamKind::kFeatures), -1);
+  EXPECT_EQ(SequenceCheck().last(StreamKind::kOdometry), -1);
+}
+
 TEST(Pipeline, AbsurdSequenceNumbersDoNotOverflow) {
   PipelineFixture f;
   f.pipeline.push(imu_sample(1, 0));
@@ -267,6 +289,8 @@ TEST(AnyEstimator, NamesLeadToEstimators) {
 TEST(Channels, AreParsedStrictly) {
   EXPECT_EQ(parse_channels({"imu=A", "gps=B=C"})[0], "A");
   EXPECT_EQ(parse_channels({"imu=A", "gps=B=C"})[3], "B=C");
+  EXPECT_EQ(parse_channels({"odometry=O", "features=F"})[5], "O");
+  EXPECT_EQ(parse_channels({"odometry=O", "features=F"})[6], "F");
   for (const std::string wrong : {"imu", "imu=", "sonar=X", "=X"}) EXPECT_THROW(parse_channels({wrong}), UsageError);
   EXPECT_THROW(parse_channels({"imu=" + std::string(64, 'x')}), UsageError);
 }

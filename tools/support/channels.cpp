@@ -10,8 +10,10 @@ constexpr std::size_t kMaxChannel = 63;
 }  // namespace
 
 void add_channel_option(CLI::App& app, std::vector<std::string>& assignments) {
-  app.add_option("--channel", assignments,
-                 "STREAM=NAME, may be given several times; streams: imu, magnetometer, image, gps, reference");
+  app.add_option(
+      "--channel", assignments,
+      "STREAM=NAME, may be given several times; streams: imu, magnetometer, image, gps, reference, odometry, "
+      "features");
 }
 
 std::array<std::string, kStreamKinds> parse_channels(const std::vector<std::string>& assignments) {

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <exception>
 #include <thread>
 #include <utility>
@@ -26,6 +27,8 @@ constexpr int kRefusalsLogged = 10;
 constexpr std::size_t kMaxSampleBytes = 4096;
 constexpr std::size_t kExpectedSampleBytes = 128;
 constexpr std::size_t kMaxImageBytes = 64 << 20;
+constexpr std::size_t kMaxFeaturesBytes = 256 << 10;  // 10 000 features in one frame
+constexpr std::size_t kFeaturesCapacity = 1024;       // frames: a bound on memory
 constexpr std::size_t kMaxStatusBytes = 64 << 10;
 constexpr std::size_t kStatusCapacity = 64;
 
@@ -34,6 +37,9 @@ std::vector<InputQueueOptions> queue_options(const AnyEstimator& estimator, cons
   for (const StreamKind kind : estimator.inputs()) {
     if (kind == StreamKind::kImage) {
       out.push_back({stream_name(kind), options.image_capacity, kMaxImageBytes, 0, WhenFull::kDropOldest});
+    } else if (kind == StreamKind::kFeatures) {
+      out.push_back({stream_name(kind), std::min(options.queue_capacity, kFeaturesCapacity), kMaxFeaturesBytes, 0,
+                     WhenFull::kRefuseNewest});
     } else {
       out.push_back(
           {stream_name(kind), options.queue_capacity, kMaxSampleBytes, kExpectedSampleBytes, WhenFull::kRefuseNewest});

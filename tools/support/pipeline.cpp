@@ -35,8 +35,7 @@ void SequenceCheck::see(const Measurement& measurement) {
   ++counts.received;
   if (sequence < 0) return;
   last_of_kind_[static_cast<std::size_t>(kind)] = sequence;
-  const auto* image = std::get_if<ImageMeasurement>(&measurement);
-  const auto [place, first] = last_.try_emplace({kind, image != nullptr ? image->camera : 0}, sequence);
+  const auto [place, first] = last_.try_emplace({kind, camera_of(measurement)}, sequence);
   if (first) return;
   std::int64_t& last = place->second;
   if (sequence > last) {

@@ -33,7 +33,7 @@ class SequenceCheck {
 
  private:
   std::array<Counts, kStreamKinds> counts_{};
-  std::array<std::int64_t, kStreamKinds> last_of_kind_ = {-1, -1, -1, -1, -1};
+  std::array<std::int64_t, kStreamKinds> last_of_kind_ = {-1, -1, -1, -1, -1, -1, -1};
   std::map<std::pair<StreamKind, int>, std::int64_t> last_;
 };
 

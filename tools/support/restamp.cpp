@@ -17,10 +17,11 @@ namespace {
 
 constexpr TimeNs kSecond = 1'000'000'000;
 constexpr TimeNs kReportEvery = 10 * kSecond;
+constexpr std::size_t kOdometryTimes = 64;    // as far back as a relative pose may begin, in samples
 constexpr TimeNs kForgetOther = 5 * kSecond;  // without news from one program another may take its place
 
 std::string name_of(StreamKind kind, int camera) {
-  return stream_name(kind) + (kind == StreamKind::kImage ? std::to_string(camera) : std::string());
+  return stream_name(kind) + (has_camera(kind) ? std::to_string(camera) : std::string());
 }
 
 }  // namespace
@@ -66,6 +67,7 @@ std::optional<Measurement> RestampedSource::next() {
   for (;;) {
     while (!waiting_.empty()) {
       Waiting& first = waiting_.front();
+      const TimeNs device_ns = stamp_of(first.measurement).time_ns;
       const Outcome outcome = stamp(first);
       if (outcome == Outcome::kWait) {
         const TimeNs waited = saturating_difference(newest_arrival_ns_, stamp_of(first.measurement).host_time_ns);
@@ -80,6 +82,7 @@ std::optional<Measurement> RestampedSource::next() {
         continue;
       }
       ++stamped_;
+      if (auto* odometry = std::get_if<OdometryMeasurement>(&measurement)) move_start(*odometry, device_ns);
       return measurement;
     }
     if (ended_) {
@@ -132,8 +135,7 @@ void RestampedSource::listen(const GpsMeasurement& fix) {
 
 void RestampedSource::accept(Measurement measurement) {
   const StreamKind kind = kind_of(measurement);
-  const auto* image = std::get_if<ImageMeasurement>(&measurement);
-  const StreamId id{kind, image != nullptr ? image->camera : 0};
+  const StreamId id{kind, camera_of(measurement)};
   const Stamp& s = stamp_of(measurement);
   if (s.host_time_ns == kNoTime) {
     throw DataError(name_of(id.first, id.second) + " at time_ns = " + std::to_string(s.time_ns) +
@@ -153,6 +155,22 @@ void RestampedSource::accept(Measurement measurement) {
   }
   waiting.epoch = stream.model.epoch();
   waiting_.push_back(std::move(waiting));
+}
+
+// Both ends of a relative pose are on one clock. A start that is the time of an earlier sample gets that sample's time,
+// so that poses which join still do; any other one keeps its distance to the end.
+void RestampedSource::move_start(OdometryMeasurement& odometry, TimeNs device_ns) {
+  const TimeNs start_ns = odometry.start_time_ns;
+  if (start_ns != kNoTime) {
+    const auto same = std::ranges::find(odometry_times_, start_ns, &std::pair<TimeNs, TimeNs>::first);
+    odometry.start_time_ns =
+        same != odometry_times_.end() && same->second < odometry.time_ns
+            ? same->second
+            : std::max(kNoTime + 1,
+                       saturating_difference(odometry.time_ns, saturating_difference(device_ns, start_ns)));
+  }
+  odometry_times_.emplace_back(device_ns, odometry.time_ns);
+  if (odometry_times_.size() > kOdometryTimes) odometry_times_.pop_front();
 }
 
 void RestampedSource::drop_oldest() {

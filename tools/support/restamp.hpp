@@ -11,8 +11,8 @@
 // after pulse_wait_s without pulses; pulses that come later make the same time better, without a step back.
 // A fix whose own time is farther than 1 s and six sigma from what the line from host to GPS makes of its arrival is
 // dropped and counted (gps.time_disagrees): one wrong date must not leave amid the stream.
-// host_time_ns stays as it was. Times of a stream never step back, unless a clock was set or GPS labels were wrong:
-// counted (clock.steps), and told.
+// The start of a relative odometry moves with its end. host_time_ns stays as it was. Times of a stream never step back,
+// unless a clock was set or GPS labels were wrong: counted (clock.steps), and told.
 #pragma once
 
 #include <atomic>
@@ -111,6 +111,7 @@ class RestampedSource : public MeasurementSource {
 
   std::optional<Measurement> as_it_is();
   void accept(Measurement measurement);
+  void move_start(OdometryMeasurement& odometry, TimeNs device_ns);
   static bool disagrees(const GpsMeasurement& fix, const ClockLine& line);
   void refuse(std::int64_t& count, const std::string& why);
   TimeNs steady() const;
@@ -128,7 +129,8 @@ class RestampedSource : public MeasurementSource {
   std::map<StreamId, Stream> streams_;
   std::deque<Waiting> waiting_;
   GpsClock gps_;
-  TimeNs gps_since_ns_ = kNoTime;  // arrival of the first label
+  std::deque<std::pair<TimeNs, TimeNs>> odometry_times_;  // of the last samples: as they came, as they left
+  TimeNs gps_since_ns_ = kNoTime;                         // arrival of the first label
   bool own_events_ = false;
   // What another program says.
   std::optional<ClockLine> other_;
