@@ -32,6 +32,10 @@ class Motion {
   virtual double duration_s() const = 0;
   /// @param time_s within [0, duration_s()] @throws std::invalid_argument outside.
   virtual MotionState at(double time_s) const = 0;
+
+ protected:
+  /// @throws std::invalid_argument naming the time, unless it is in [0, duration_s()].
+  void check_time(double time_s) const;
 };
 
 }  // namespace loc
