@@ -49,6 +49,19 @@ void TriadCalibration::check(const std::string& name) const {
   if (quality) quality->check(name + ".quality");
 }
 
+void CameraCalibration::check() const {
+  require(width_px > 0 && height_px > 0, name + ".resolution: must be positive");
+  require(intrinsics_px.allFinite() && intrinsics_px.head<2>().minCoeff() > 0,
+          name + ".intrinsics: must be finite, with positive focal lengths");
+  require(distortion.allFinite(), name + ".distortion_coeffs: must be finite");
+  require(T_body_camera.translation.allFinite(), name + ".T_cam_imu: must be finite");
+  // The comparison is false for NaN.
+  const double norm = T_body_camera.rotation.norm();
+  require(std::abs(norm - 1) < 1e-6, name + ".T_cam_imu: norm of its rotation", norm, "must be 1");
+  require_finite(name + ".timeshift_cam_imu", time_offset_s);
+  require_not_negative(name + ".rate_hz", rate_hz);
+}
+
 void ClockCalibration::check() const {
   require_line("clocks.stream", stream);
   require_line("clocks.reference", reference);
@@ -73,18 +86,7 @@ void Rig::check() const {
     imu->accelerometer.check("imu.accelerometer");
   }
   if (magnetometer) magnetometer->triad.check("magnetometer");
-  for (const CameraCalibration& camera : cameras) {
-    require(camera.width_px > 0 && camera.height_px > 0, camera.name + ".resolution: must be positive");
-    require(camera.intrinsics_px.allFinite() && camera.intrinsics_px.head<2>().minCoeff() > 0,
-            camera.name + ".intrinsics: must be finite, with positive focal lengths");
-    require(camera.distortion.allFinite(), camera.name + ".distortion_coeffs: must be finite");
-    require(camera.T_body_camera.translation.allFinite(), camera.name + ".T_cam_imu: must be finite");
-    // The comparison is false for NaN.
-    const double norm = camera.T_body_camera.rotation.norm();
-    require(std::abs(norm - 1) < 1e-6, camera.name + ".T_cam_imu: norm of its rotation", norm, "must be 1");
-    require_finite(camera.name + ".timeshift_cam_imu", camera.time_offset_s);
-    require_not_negative(camera.name + ".rate_hz", camera.rate_hz);
-  }
+  for (const CameraCalibration& camera : cameras) camera.check();
   if (gps) {
     require(gps->antenna_in_body.allFinite(), "gps.antenna_in_body: must be finite");
     require(std::abs(gps->time_offset_s) <= kLargestGpsOffset, "gps.time_offset_s", gps->time_offset_s,

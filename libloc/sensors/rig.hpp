@@ -65,6 +65,9 @@ struct CameraCalibration {
   Pose3 T_body_camera;
   double time_offset_s = 0;  ///< t_imu = t_camera + time_offset (Kalibr's timeshift_cam_imu)
   double rate_hz = 0;        ///< nominal; 0 when unknown
+
+  /// @throws std::invalid_argument naming the camera, the field and its value.
+  void check() const;
 };
 
 struct GpsCalibration {
