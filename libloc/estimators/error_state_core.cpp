@@ -176,6 +176,10 @@ void Machine::reset_attitude(Core& core, int column, const Eigen::Vector3d& thet
     const Eigen::Vector3d entry = p.block<3, 1>(column, i);
     p.block<3, 1>(column, i) = entry - half.cross(entry);
   }
+  // Both sides were at work here, in an order that rounding sees.
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < i; ++j) p(column + j, column + i) = p(column + i, column + j);
+  }
 }
 
 void Machine::clone(Core& core) const {
