@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string_view>
 
 #include "libloc/geometry/pose3.hpp"
 
@@ -19,6 +20,9 @@ struct MotionState {
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();      ///< of body, in body axes [rad/s]
   Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< of body, in body axes [rad/s^2]
 };
+
+/// @throws std::invalid_argument naming the pose, unless it is finite and its rotation of norm 1 (to 1e-6).
+void require_rigid(std::string_view name, const Pose3& pose);
 
 /// A motion is asked for its state at any time, in any order; the same time gives the same state.
 class Motion {
