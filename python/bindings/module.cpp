@@ -11,6 +11,7 @@ PYBIND11_MODULE(_core, m) {
   locpy::bind_geometry(m);
   locpy::bind_sensors(m);
   locpy::bind_estimators(m);
+  locpy::bind_error_state(m);
   locpy::bind_ellipsoid(m);
   locpy::bind_clock(m);
   locpy::bind_calib_inertial(m);
