@@ -2,12 +2,15 @@
 
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 #include "libloc/core/check.hpp"
 #include "libloc/sim/quadrature.hpp"
 
 namespace loc {
 namespace {
+
+constexpr double kShortestShare = 0.01;  // length of the straight line by that of the curve
 
 // Integrals over [0, 1] of t^k cos(phase) and t^k sin(phase).
 struct Moments {
@@ -46,7 +49,8 @@ double start_value(double phi0, double phi1) {
 }  // namespace
 
 double wrap_angle(double angle) {
-  return std::remainder(angle, 2 * std::numbers::pi);
+  const double wrapped = std::remainder(angle, 2 * std::numbers::pi);
+  return wrapped <= -std::numbers::pi ? std::numbers::pi : wrapped;
 }
 
 ClothoidPoint Clothoid::at(double arc_length) const {
@@ -84,8 +88,11 @@ ClothoidFit fit_clothoid(const Eigen::Vector2d& start, double start_course, cons
     a -= step;
     m = moments(a, delta, phi0);
   }
-  require(std::abs(m.s0) < 1e-13 && m.c0 > 0, "end_course - start_course", end_course - start_course,
-          "no clothoid joins the points with these courses");
+  if (!(std::abs(m.s0) < 1e-13 && m.c0 > kShortestShare)) {
+    throw std::invalid_argument("courses " + to_text(phi0, 6) + " and " + to_text(phi1, 6) +
+                                " rad from the straight line: the clothoid would be more than 100 times as long as "
+                                "the line");
+  }
 
   ClothoidFit fit;
   const double length = distance / m.c0;

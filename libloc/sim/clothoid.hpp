@@ -34,11 +34,12 @@ struct ClothoidFit {
 
 /// From one point with its course to another with its own: the short way, no more than the turns that the courses ask
 /// for (each course is taken within pi of the straight line's). A course opposite to that line gives a loop.
-/// @throws std::invalid_argument when the points are the same or something is not finite.
+/// @throws std::invalid_argument when the points are the same or something is not finite; when the curve would be more
+/// than 100 times as long as the line (courses nearly opposite to it, one turning left and one right).
 ClothoidFit fit_clothoid(const Eigen::Vector2d& start, double start_course, const Eigen::Vector2d& end,
                          double end_course);
 
-/// The angle minus the multiple of two pi that leaves it in [-pi, pi].
+/// The angle minus the multiple of two pi that leaves it in (-pi, pi].
 double wrap_angle(double angle);
 
 }  // namespace loc

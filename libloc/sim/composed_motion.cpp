@@ -35,7 +35,8 @@ MotionState MountedMotion::at(double time_s) const {
 
 void RestFirstOptions::check() const {
   require_not_negative("rest_s", rest_s);
-  require_not_negative("ease_s", ease_s);
+  require(std::isfinite(ease_s) && (ease_s == 0 || ease_s >= 1e-3), "ease_s", ease_s,
+          "must be 0, or finite and at least 1e-3");
 }
 
 RestFirstMotion::RestFirstMotion(std::shared_ptr<const Motion> motion, const RestFirstOptions& options)

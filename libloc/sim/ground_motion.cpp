@@ -13,6 +13,11 @@ namespace {
 
 constexpr double kQuarterTurn = 0.5 * std::numbers::pi;
 
+// Shorter ones would have accelerations without bound.
+void require_time(std::string_view name, double value) {
+  require(std::isfinite(value) && value >= 1e-3, name, value, "must be finite and at least 1e-3");
+}
+
 TimeJet constant(double value) {
   return {value, 0, 0};
 }
@@ -42,7 +47,7 @@ void GroundCourseOptions::check() const {
   require(!phases.empty(), "phases: there must be at least one");
   for (std::size_t i = 0; i < phases.size(); ++i) {
     const std::string name = "phases[" + std::to_string(i) + "].";
-    require_positive(name + "duration_s", phases[i].duration_s);
+    require_time(name + "duration_s", phases[i].duration_s);
     require_not_negative(name + "speed_mps", phases[i].speed_mps);
     require_finite(name + "turn_rad", phases[i].turn_rad);
   }
@@ -132,7 +137,7 @@ void PedestrianOptions::check() const {
   require_finite("nod_rad", nod_rad);
   require_finite("roll_rad", roll_rad);
   require_finite("head_turn_rad", head_turn_rad);
-  require_positive("head_turn_s", head_turn_s);
+  require_time("head_turn_s", head_turn_s);
   require(std::isfinite(head_turn_period_s) && head_turn_period_s >= head_turn_s, "head_turn_period_s",
           head_turn_period_s, "must be finite and not less than head_turn_s");
 }

@@ -45,6 +45,10 @@ PiecewiseCubic PiecewiseCubic::hermite(std::vector<double> knots, const std::vec
     const double secant = (values[i + 1] - values[i]) / h;
     out.pieces_.push_back({{values[i], slopes[i], (3 * secant - 2 * slopes[i] - slopes[i + 1]) / h,
                             (slopes[i] + slopes[i + 1] - 2 * secant) / (h * h)}});
+    for (const double c : out.pieces_.back().c) {
+      require(std::isfinite(c), "knots[" + std::to_string(i + 1) + "]", out.knots_[i + 1],
+              "is too close to the one before for the values there");
+    }
   }
   return out;
 }

@@ -10,6 +10,8 @@ namespace loc {
 namespace {
 
 constexpr double kForEver = std::numeric_limits<double>::infinity();
+constexpr double kShortestTime = 1e-3;  // [s]
+constexpr double kLowestHz = 1e-6;
 constexpr double kTwoPi = 2 * std::numbers::pi;
 
 void require_finite_point(std::string_view name, const Eigen::Vector3d& point) {
@@ -40,6 +42,7 @@ void CircleOptions::check() const {
   require_finite_point("center", center);
   require_positive("radius_m", radius_m);
   require_finite("speed_mps", speed_mps);
+  require_finite("square of speed_mps / radius_m", std::pow(speed_mps / radius_m, 2));
   require_finite("start_angle_rad", start_angle_rad);
 }
 
@@ -66,7 +69,7 @@ void FigureEightOptions::check() const {
   require_positive("length_m", length_m);
   require_positive("width_m", width_m);
   require_finite("height_m", height_m);
-  require_positive("period_s", period_s);
+  require(std::isfinite(period_s) && period_s >= kShortestTime, "period_s", period_s, "must be finite, at least 1e-3");
 }
 
 FigureEightMotion::FigureEightMotion(const FigureEightOptions& options) : options_((options.check(), options)) {}
@@ -101,7 +104,7 @@ void HandHeldOptions::check() const {
   require_rigid("T_world_mean", T_world_mean);
   require_not_negative("angular_rate_rms", angular_rate_rms);
   require_not_negative("acceleration_rms", acceleration_rms);
-  require_positive("lowest_hz", lowest_hz);
+  require(lowest_hz >= kLowestHz, "lowest_hz", lowest_hz, "must be at least 1e-6");
   require(std::isfinite(highest_hz) && highest_hz > lowest_hz, "highest_hz", highest_hz,
           "must be finite and greater than lowest_hz");
   require_not_negative("scale", scale);

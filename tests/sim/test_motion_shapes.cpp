@@ -295,14 +295,14 @@ TEST(ShapeMotion, BadInputNamesFieldAndValue) {
   EXPECT_EQ(thrown_text([] {
               FigureEightMotion{{{0, 0, 0}, 1, 1, 0, 0}};
             }),
-            "period_s = 0: must be positive and finite");
+            "period_s = 0: must be finite, at least 1e-3");
   const auto hand = [](auto change) {
     HandHeldOptions o;
     change(o);
     return thrown_text([&] { HandHeldMotion(o, Random(1)); });
   };
   EXPECT_EQ(hand([](auto& o) { o.scale = -1; }), "scale = -1: must not be negative, and finite");
-  EXPECT_EQ(hand([](auto& o) { o.lowest_hz = 0; }), "lowest_hz = 0: must be positive and finite");
+  EXPECT_EQ(hand([](auto& o) { o.lowest_hz = 0; }), "lowest_hz = 0: must be at least 1e-6");
   EXPECT_EQ(hand([](auto& o) { o.highest_hz = 0.2; }), "highest_hz = 0.2: must be finite and greater than lowest_hz");
   EXPECT_EQ(hand([](auto& o) { o.angular_rate_rms = kNan; }),
             "angular_rate_rms = nan: must not be negative, and finite");
@@ -317,7 +317,8 @@ TEST(GroundMotion, BadInputNamesFieldAndValue) {
     return thrown_text([&] { CarMotion{o}; });
   };
   EXPECT_EQ(car([](auto& c) { c.phases.clear(); }), "phases: there must be at least one");
-  EXPECT_EQ(car([](auto& c) { c.phases[2].duration_s = 0; }), "phases[2].duration_s = 0: must be positive and finite");
+  EXPECT_EQ(car([](auto& c) { c.phases[2].duration_s = 0; }),
+            "phases[2].duration_s = 0: must be finite and at least 1e-3");
   EXPECT_EQ(car([](auto& c) { c.phases[2].speed_mps = -1; }),
             "phases[2].speed_mps = -1: must not be negative, and finite");
   EXPECT_EQ(car([](auto& c) { c.phases[0].turn_rad = 1; }), "phases[0].turn_rad = 1: a car cannot turn on the spot");
@@ -348,6 +349,10 @@ TEST(ComposedMotion, BadInputNamesFieldAndValue) {
               RestFirstMotion(circle, {1, 0});
             }),
             "ease_s = 0: must be positive: the motion does not begin at rest");
+  EXPECT_EQ(thrown_text([&] {
+              RestFirstMotion(circle, RestFirstOptions{1, kNan});
+            }),
+            "ease_s = nan: must be 0, or finite and at least 1e-3");
   EXPECT_EQ(thrown_text([&] {
               RestFirstMotion(std::make_shared<const CarMotion>(), {1, 200});
             }),

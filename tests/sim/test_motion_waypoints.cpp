@@ -53,8 +53,8 @@ TEST(Clothoid, PositionIsTheIntegralOfItsDirection) {
 TEST(Clothoid, JoinsPointsWithAnyCourses) {
   const Vector2d start(100, -50);
   const Vector2d end(103, -46);
-  for (int i = -179; i <= 180; i += 7) {
-    for (int j = -179; j <= 180; j += 7) {
+  for (int i = -172; i <= 180; i += 8) {
+    for (int j = -172; j <= 180; j += 8) {
       const double course0 = i * pi / 180;
       const double course1 = j * pi / 180;
       const Clothoid c = fit_clothoid(start, course0, end, course1).clothoid;
@@ -93,8 +93,16 @@ TEST(Clothoid, BadInput) {
   EXPECT_THROW(fit_clothoid({0, 0}, 0, {0, 0}, 0), std::invalid_argument);
   EXPECT_THROW(fit_clothoid({0, 0}, kNan, {1, 0}, 0), std::invalid_argument);
   EXPECT_THROW(fit_clothoid({0, kNan}, 0, {1, 0}, 0), std::invalid_argument);
-  // Backwards at both ends, and a whole turn between: such a curve would be without end.
-  EXPECT_THROW(fit_clothoid({0, 0}, pi, {1, 0}, -pi), std::invalid_argument);
+  // Backwards at both ends, and a whole turn between: such a curve would be (nearly) without end.
+  EXPECT_EQ(
+      thrown_text([] {
+        fit_clothoid({0, 0}, 3.14, {1, 0}, -3.14);
+      }),
+      "courses 3.14 and -3.14 rad from the straight line: the clothoid would be more than 100 times as long as the "
+      "line");
+  // Exactly backwards is the same angle with either sign.
+  EXPECT_EQ(fit_clothoid({0, 0}, pi, {1, 0}, pi).clothoid.length,
+            fit_clothoid({0, 0}, -pi, {1, 0}, pi).clothoid.length);
 }
 
 TEST(PiecewiseCubic, SplineIsTheCubicItself) {
@@ -333,6 +341,7 @@ TEST(WaypointMotion, BadInputNamesIndexAndValue) {
   using O = WaypointOptions;
   EXPECT_EQ(text([](O& o) { o.times_s[3] = 25; }), "times_s[3] = 25: must be greater than the one before");
   EXPECT_EQ(text([](O& o) { o.times_s[3] = kNan; }), "times_s[3] = nan: must be finite");
+  EXPECT_EQ(text([](O& o) { o.times_s[1] = 1e-300; }).substr(0, 18), "knots[1] = 1e-300:");
   EXPECT_EQ(text([](O& o) { o.times_s[0] = 1; }), "times_s[0] = 1: must be 0");
   EXPECT_EQ(text([](O& o) { o.times_s.pop_back(); }), "number of times_s = 10: must be the number of positions, 11");
   EXPECT_EQ(text([](O& o) { o.velocities.pop_back(); }),
