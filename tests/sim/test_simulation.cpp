@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "libloc/geometry/so3.hpp"
+#include "libloc/sim/scenario_parameters.hpp"
 #include "libloc/sim/simulation.hpp"
 #include "libloc/sim/stream_clock.hpp"
 #include "tests/support/numeric_jacobian.hpp"
@@ -245,6 +246,77 @@ TEST(Scenario, RefusesWhatMakesNoSense) {
   EXPECT_THROW(Simulation(scenario, 1), std::invalid_argument);
   // A car goes round again.
   EXPECT_GE(make_scenario("street-car", 500).motion->duration_s(), 500);
+}
+
+TEST(ScenarioParameters, EachIsReadAndSetByItsName) {
+  const Scenario scenario = make_scenario("street-car");
+  const std::vector<ScenarioParameter> all = parameters(scenario);
+  EXPECT_GT(all.size(), 100);
+  std::set<std::string> names;
+  for (const ScenarioParameter& p : all) {
+    EXPECT_TRUE(names.insert(p.name).second) << p.name;
+    EXPECT_FALSE(p.unit.empty()) << p.name;
+    // What is told can be set, and gives back the same.
+    Scenario copy = scenario;
+    EXPECT_NO_THROW(set_parameter(copy, p.name, p.value)) << p.name;
+    EXPECT_NO_THROW(copy.check()) << p.name;
+    const std::vector<ScenarioParameter> again = parameters(copy);
+    for (std::size_t i = 0; i < all.size(); ++i) EXPECT_EQ(again[i].value, all[i].value) << p.name;
+  }
+}
+
+TEST(ScenarioParameters, FormsOfValues) {
+  Scenario s = make_scenario("street-car");
+  set_parameter(s, "odometry.latency_s", "0.2");
+  EXPECT_EQ(s.odometry.latency_s, 0.2);
+  set_parameter(s, "gps.outages", "20:30, [40, 45.5]");
+  ASSERT_EQ(s.gps.outages.size(), 2);
+  EXPECT_EQ(s.gps.outages[1].begin_s, 40);
+  EXPECT_EQ(s.gps.outages[1].end_s, 45.5);
+  set_parameter(s, "gps.outages", "");
+  EXPECT_TRUE(s.gps.outages.empty());
+  set_parameter(s, "imu.sampling", "point");
+  EXPECT_EQ(s.imu.sampling, ImuSampleModel::kPoint);
+  set_parameter(s, "imu.gyroscope.constant_bias", "[1, -2, +3e-1]");
+  EXPECT_EQ(s.imu.gyroscope.constant_bias, Eigen::Vector3d(1, -2, 0.3));
+  set_parameter(s, "imu.gyroscope.constant_bias", "0.5");
+  EXPECT_EQ(s.imu.gyroscope.constant_bias, Eigen::Vector3d(0.5, 0.5, 0.5));
+  set_parameter(s, "imu.gyroscope.matrix", "[[1, 2, 3], [4, 5, 6], [7, 8, 10]]");
+  EXPECT_EQ(s.imu.gyroscope.matrix(1, 2), 6);
+  set_parameter(s, "imu.gyroscope.matrix", "1, 2, 3");
+  EXPECT_EQ(s.imu.gyroscope.matrix(2, 2), 3);
+  EXPECT_EQ(s.imu.gyroscope.matrix(2, 1), 0);
+  set_parameter(s, "imu.gyroscope.range", "inf");
+  EXPECT_TRUE(std::isinf(s.imu.gyroscope.range));
+  set_parameter(s, "streams.gps", "off");
+  EXPECT_FALSE(s.streams.gps);
+  set_parameter(s, "camera.max_features", "40");
+  EXPECT_EQ(s.cameras[0].model.max_features, 40);
+  set_parameter(s, "imu.clock.delay_minimum_ns", "1000");
+  EXPECT_EQ(s.imu_clock.delay.minimum_ns, 1000);
+
+  const auto message = [&](const char* name, const char* value) {
+    try {
+      set_parameter(s, name, value);
+    } catch (const std::invalid_argument& e) {
+      return std::string(e.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_EQ(message("vo.latency_s", "1"),
+            "there is no parameter 'vo.latency_s'; did you mean odometry.latency_s, gps.latency_s, camera.latency_s?");
+  EXPECT_EQ(message("nonsense", "1"), "there is no parameter 'nonsense'");
+  EXPECT_EQ(message("odometry.latency_s", "0.2s"), "odometry.latency_s = '0.2s': must be a number");
+  EXPECT_EQ(message("odometry.latency_s", "1 2"), "odometry.latency_s = '1 2': must be one number");
+  EXPECT_EQ(message("odometry.latency_s", ""), "odometry.latency_s = '': must be one number");
+  EXPECT_EQ(message("odometry.relative", "maybe"), "odometry.relative = 'maybe': must be true or false");
+  EXPECT_EQ(message("gps.outages", "20"), "gps.outages = '20': must be begin:end in seconds, as often as needed");
+  EXPECT_EQ(message("gps.antenna_in_body", "1, 2"),
+            "gps.antenna_in_body = '1, 2': must be three numbers, or one for all");
+  EXPECT_EQ(message("imu.gyroscope.matrix", "1, 2"),
+            "imu.gyroscope.matrix = '1, 2': must be nine numbers, three for the diagonal, or one");
+  EXPECT_EQ(message("camera.max_features", "4.5"), "camera.max_features = '4.5': must be a whole number");
+  EXPECT_EQ(message("imu.sampling", "mean"), "imu.sampling = 'mean': must be point, interval-mean or increment");
 }
 
 TEST(Simulation, SameSeedSameBytes) {
