@@ -51,6 +51,9 @@ class LineReader {
 /// Without blanks and tabs at both ends.
 std::string_view trim(std::string_view text);
 
+/// The next word between blanks or tabs, taken off the front of rest; empty at the end.
+std::string_view next_word(std::string_view& rest);
+
 /// Cells between commas, trimmed. The result is kept in cells, to save allocations.
 void split_cells(std::string_view line, std::vector<std::string_view>& cells);
 

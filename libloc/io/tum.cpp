@@ -10,24 +10,15 @@
 namespace loc {
 namespace {
 
-// The next word between blanks, taken off the front of rest.
-std::string_view next_word(std::string_view& rest) {
-  rest = io::trim(rest);
-  const auto end = std::min(rest.find_first_of(" \t"), rest.size());
-  const std::string_view word = rest.substr(0, end);
-  rest.remove_prefix(end);
-  return word;
-}
-
 std::pair<TimeNs, Pose3> parse_pose(std::string_view line, const std::string& where) {
   static constexpr std::array<const char*, 7> kNames{"tx", "ty", "tz", "qx", "qy", "qz", "qw"};
   std::string_view rest = line;
-  const std::string_view time = next_word(rest);
+  const std::string_view time = io::next_word(rest);
   const auto time_ns = io::parse_time(time, 0);
   if (!time_ns) throw DataError(where + ": '" + std::string(time) + "' is not a time in seconds");
   std::array<double, 7> values{};
   for (std::size_t i = 0; i < values.size(); ++i) {
-    const std::string_view word = next_word(rest);
+    const std::string_view word = io::next_word(rest);
     if (word.empty()) throw DataError(where + ": " + kNames[i] + " is missing; a pose has 8 columns");
     const auto value = io::parse_number(word);
     if (!value || !std::isfinite(*value)) {
