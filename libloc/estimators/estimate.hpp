@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "libloc/core/time.hpp"
+#include "libloc/geometry/geodesy.hpp"
 #include "libloc/sensors/measurements.hpp"
 
 namespace loc {
@@ -20,6 +21,7 @@ enum EstimateValid : std::uint32_t {
   kValidGyroscopeBias = 1U << 4U,
   kValidAccelerometerBias = 1U << 5U,
   kValidCovariance = 1U << 6U,
+  kValidScale = 1U << 7U,  ///< scale and scale_sigma
 };
 
 /// What an estimator did with the input since its last estimate, and why. Zero is the normal case.
@@ -35,6 +37,12 @@ enum EstimateStatus : std::uint32_t {
   kTimeNotIncreasing = 1U << 8U,      ///< Input skipped: its time is not after the last one's.
   kGap = 1U << 9U,                    ///< Time since the last sample is past the limit.
   kOutOfRange = 1U << 10U,            ///< Input skipped: finite, but more than any sensor reads.
+  kBridged = 1U << 11U,               ///< A short gap was integrated over, with more noise.
+  kGpsRejected = 1U << 12U,           ///< GPS has been rejected for a while: one of the two is wrong.
+  kOdometryRejected = 1U << 13U,      ///< The same of the odometry.
+  kRecovered = 1U << 14U,             ///< The covariance was widened, because a source was rejected for too long.
+  kTooLate = 1U << 15U,               ///< Input skipped: older than the history, or than the start.
+  kBadCovariance = 1U << 16U,         ///< Input skipped: its covariance is not positive definite.
 };
 
 /// Error-state order of the covariance: theta, position, velocity, gyroscope bias, accelerometer bias.
@@ -56,6 +64,10 @@ struct Estimate {
   /// Of the error (theta [rad, body axes], p, v, bg, ba); the first covariance_dim rows and columns hold something.
   Eigen::Matrix<double, kMaxEstimateDim, kMaxEstimateDim> covariance;
   int covariance_dim = 0;
+  double scale = kUnknown;        ///< of the odometry: its unit per metre
+  double scale_sigma = kUnknown;  ///< its deviation
+  /// Where on the Earth world's (0, 0, 0) is; NaN when nothing ties it to the Earth.
+  GeodeticPoint origin{kUnknown, kUnknown, kUnknown};
 };
 
 }  // namespace loc

@@ -1,0 +1,336 @@
+// GPS and odometry in InertialFusion, and what is done when they are rejected.
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "libloc/estimators/inertial_fusion.hpp"
+#include "libloc/geometry/so3.hpp"
+
+namespace loc {
+namespace {
+
+constexpr int kToldAfter = 3;  // rejections in a row
+// So little is known of what is not measured that nothing follows from it, however often it is said. [m^2], [rad^2]
+constexpr double kNothing = 1e8;
+constexpr double kOldestAnchor = 1;     // [s]
+constexpr double kScaleDoubt = 0.3;     // of the scale, when the odometry is not believed any more
+constexpr double kAttitudeDoubt = 0.1;  // [rad]
+
+double square(double x) {
+  return x * x;
+}
+
+}  // namespace
+
+void InertialFusion::process_other(const Measurement& measurement) {
+  if (const auto* gps = std::get_if<GpsMeasurement>(&measurement)) {
+    fuse(*gps);
+  } else if (const auto* odometry = std::get_if<OdometryMeasurement>(&measurement)) {
+    fuse(*odometry);
+  }
+}
+
+bool InertialFusion::prepare(const GpsMeasurement& gps, Eigen::Vector3d& position, Eigen::Matrix3d& position_cov,
+                             Eigen::Vector3d& velocity, Eigen::Matrix3d& velocity_cov) {
+  if (gps.fix < GpsFixType::k2d) {
+    ++counts_["gps.skipped.no_fix"];
+    return false;
+  }
+  if (!std::isfinite(gps.latitude) || !std::isfinite(gps.longitude)) {
+    skip("gps.skipped.not_finite", kNotFinite);
+    return false;
+  }
+  if (std::abs(gps.latitude) > std::numbers::pi / 2) {
+    skip("gps.skipped.out_of_range", kOutOfRange);
+    return false;
+  }
+  TimeNs ahead = 0;
+  if (gps.time_ns == kNoTime || __builtin_sub_overflow(gps.time_ns, filter().time_ns(), &ahead) ||
+      to_seconds(ahead) > options_.gps_max_ahead_s) {
+    ++counts_["gps.skipped.ahead"];
+    return false;
+  }
+  const bool has_height = std::isfinite(gps.altitude);
+  const GeodeticPoint place{gps.latitude, gps.longitude, has_height ? gps.altitude : 0};
+  if (!world_) {
+    world_.emplace(place);
+    if (options_.given_start) {
+      // Nobody said where on the Earth the given start is; this fix does.
+      const InertialState& x = filter().state().inertial;
+      world_.emplace(LocalFrame(place).to_geodetic(-(x.position + x.q_world_body * options_.gps_antenna)));
+      anchored_ = tied_ = true;
+    }
+  }
+  position = world_->to_local(place);
+  const Eigen::Matrix3d turn = world_->R_local_enu(place);
+  position_cov = gps.position_cov;
+  if (position_cov.hasNaN()) {
+    double sigma = options_.gps_sigma;
+    if (gps.fix == GpsFixType::kDifferential) sigma *= options_.gps_differential_part;
+    if (gps.fix == GpsFixType::kFloat) sigma *= options_.gps_float_part;
+    if (gps.fix == GpsFixType::kFixed) sigma *= options_.gps_fixed_part;
+    position_cov =
+        Eigen::Vector3d(square(sigma), square(sigma), square(sigma * options_.gps_vertical_factor)).asDiagonal();
+  }
+  // The first fix becomes the state, so that the filter cannot judge it.
+  if (!position_cov.allFinite() || !(position_cov - position_cov.transpose()).isZero(1e-6 * position_cov.norm()) ||
+      position_cov.llt().info() != Eigen::Success) {
+    skip("gps.bad_covariance", kBadCovariance);
+    return false;
+  }
+  position_cov = (turn * position_cov * turn.transpose()).eval();
+  if (!has_height || gps.fix == GpsFixType::k2d) {
+    position.z() = filter().state().inertial.position.z();
+    position_cov.row(2).setZero();
+    position_cov.col(2).setZero();
+    position_cov(2, 2) = kNothing;
+  }
+  velocity.setConstant(kUnknown);
+  if (options_.use_gps_velocity && gps.velocity_enu.allFinite()) {
+    velocity = turn * gps.velocity_enu;
+    velocity_cov = gps.velocity_cov.hasNaN()
+                       ? Eigen::Matrix3d(square(options_.gps_velocity_sigma) * Eigen::Matrix3d::Identity())
+                       : Eigen::Matrix3d(turn * gps.velocity_cov * turn.transpose());
+  }
+  return true;
+}
+
+void InertialFusion::fuse(const GpsMeasurement& gps) {
+  Eigen::Vector3d position;
+  Eigen::Matrix3d position_cov;
+  Eigen::Vector3d velocity;
+  Eigen::Matrix3d velocity_cov = Eigen::Matrix3d::Constant(kUnknown);
+  if (!prepare(gps, position, position_cov, velocity, velocity_cov)) return;
+  rest_.confirm_speed(velocity.norm(), std::sqrt(velocity_cov.diagonal().maxCoeff()));
+  if (!anchored_) {
+    if (std::abs(to_seconds(filter().time_ns() - gps.time_ns)) > kOldestAnchor) {
+      skip("gps.too_late", kTooLate);
+      return;
+    }
+    anchor(gps.time_ns, position, position_cov);
+    position.setConstant(kUnknown);  // it is in the state now
+    if (!velocity.allFinite()) return;
+  } else if (!heading_known_ && bank_.size() == 1) {
+    const ErrorStateState state = filter().state();
+    bank_.start_all_headings(filter().time_ns(), state, Eigen::MatrixXd(filter().covariance()));
+  }
+  take_note(bank_.fuse([&](ErrorStateFilter& one) {
+    return one.fuse_gps(gps.time_ns, position, position_cov, options_.gps_antenna, velocity, velocity_cov);
+  }));
+}
+
+// Moves the state to where GPS is; without a heading, in all of them.
+void InertialFusion::anchor(TimeNs time_ns, const Eigen::Vector3d& position, const Eigen::Matrix3d& position_cov) {
+  ErrorStateState state = filter().state();
+  Eigen::MatrixXd covariance = filter().covariance();
+  InertialState& x = state.inertial;
+  const double age = to_seconds(filter().time_ns() - time_ns);
+  const Eigen::Matrix3d velocity_cov = covariance.block<3, 3>(kVelocity, kVelocity);
+  Eigen::Matrix3d cov = position_cov + age * age * velocity_cov;
+  if (heading_known_) {
+    x.position = position - x.q_world_body * options_.gps_antenna + age * x.velocity;
+  } else {
+    x.position = position;
+    cov += (options_.gps_antenna.squaredNorm() + square(age * x.velocity.norm())) * Eigen::Matrix3d::Identity();
+  }
+  covariance.middleRows<3>(kPosition).setZero();
+  covariance.middleCols<3>(kPosition).setZero();
+  covariance.block<3, 3>(kPosition, kPosition) = 0.5 * (cov + cov.transpose());
+  const TimeNs now = filter().time_ns();
+  if (heading_known_) {
+    bank_.start(now, state, covariance);
+  } else {
+    bank_.start_all_headings(now, state, covariance);
+  }
+  anchored_ = tied_ = true;
+  follows_odometry_ = false;
+  pose_before_.reset();
+  next_status_ |= kReinitialised;
+  ++counts_["gps.anchored"];
+}
+
+void InertialFusion::fuse(const OdometryMeasurement& odometry) {
+  TimeNs ahead = 0;
+  if (odometry.time_ns == kNoTime || __builtin_sub_overflow(odometry.time_ns, filter().time_ns(), &ahead) ||
+      to_seconds(ahead) > options_.gps_max_ahead_s) {
+    ++counts_["odometry.skipped.ahead"];
+    return;
+  }
+  if (!odometry.position.allFinite() || odometry.rotation.coeffs().array().isInf().any()) {
+    skip("odometry.skipped.not_finite", kNotFinite);
+    return;
+  }
+  const auto chosen = [](const std::optional<Eigen::Matrix3d>& fixed, const Eigen::Matrix3d& said, double sigma) {
+    if (fixed) return *fixed;
+    return said.hasNaN() ? Eigen::Matrix3d(square(sigma) * Eigen::Matrix3d::Identity()) : said;
+  };
+  const Eigen::Matrix3d position_cov =
+      chosen(options_.odometry_position_cov, odometry.position_cov, options_.odometry_position_sigma);
+  const Eigen::Matrix3d orientation_cov =
+      chosen(options_.odometry_orientation_cov, odometry.orientation_cov, options_.odometry_orientation_sigma);
+  const bool clones = options_.filter.clones > 0;
+  if (odometry.start_time_ns != kNoTime) {
+    if (!clones || odometry.start_time_ns >= odometry.time_ns || odometry.rotation.coeffs().hasNaN()) {
+      ++counts_[clones ? "odometry.skipped.incomplete" : "odometry.skipped.relative"];
+      return;
+    }
+    take_note(bank_.fuse([&](ErrorStateFilter& one) {
+      return one.fuse_vo_relative(odometry.start_time_ns, odometry.time_ns, odometry.position, position_cov,
+                                  odometry.rotation, orientation_cov);
+    }));
+    return;
+  }
+  const bool free = !anchored_ && !heading_known_;  // nothing else says where world is
+  const bool absolute =
+      options_.odometry == OdometryUse::kAbsolute || (options_.odometry == OdometryUse::kAutomatic &&
+                                                      (follows_odometry_ || free) && !(odometry_left_world_ && clones));
+  if (!absolute) {
+    fuse_as_relative(odometry, position_cov, orientation_cov);
+  } else if (!follows_odometry_ && free) {
+    adopt_axes_of(odometry, position_cov, orientation_cov);
+  } else {
+    fuse_absolute(odometry, position_cov, orientation_cov);
+  }
+}
+
+void InertialFusion::fuse_absolute(const OdometryMeasurement& odometry, const Eigen::Matrix3d& position_cov,
+                                   const Eigen::Matrix3d& orientation_cov) {
+  const bool has_rotation = !odometry.rotation.coeffs().hasNaN();
+  const Eigen::Quaterniond rotation = has_rotation ? odometry.rotation : filter().state().inertial.q_world_body;
+  const Eigen::Matrix3d cov = has_rotation ? orientation_cov : Eigen::Matrix3d(kNothing * Eigen::Matrix3d::Identity());
+  const Eigen::Vector3d position = odometry.position - odometry_origin_;
+  take_note(bank_.fuse(
+      [&](ErrorStateFilter& one) { return one.fuse_vo(odometry.time_ns, position, position_cov, rotation, cov); }));
+}
+
+// Our world gets the axes of the odometry's, with the origin here: where the body is in its world is a length times a
+// scale that nobody knows yet.
+void InertialFusion::adopt_axes_of(const OdometryMeasurement& odometry, const Eigen::Matrix3d& position_cov,
+                                   const Eigen::Matrix3d& orientation_cov) {
+  TimeNs age_ns = 0;
+  if (__builtin_sub_overflow(filter().time_ns(), odometry.time_ns, &age_ns) || to_seconds(age_ns) > kOldestAnchor) {
+    skip("odometry.too_late", kTooLate);
+    return;
+  }
+  ErrorStateState state = filter().state();
+  Eigen::MatrixXd covariance = filter().covariance();
+  const ErrorStateLayout& layout = filter().layout();
+  InertialState& x = state.inertial;
+  if (!odometry.rotation.coeffs().hasNaN()) {
+    turn_heading(so3::heading(odometry.rotation) - so3::heading(x.q_world_body),
+                 std::sqrt(orientation_cov.diagonal().maxCoeff()), state, covariance);
+  }
+  const double s = state.scale;
+  const double age = to_seconds(age_ns);
+  odometry_origin_ = odometry.position;
+  x.position = age * x.velocity;
+  const Eigen::Matrix3d velocity_cov = covariance.block<3, 3>(kVelocity, kVelocity);
+  covariance.middleRows<3>(kPosition).setZero();
+  covariance.middleCols<3>(kPosition).setZero();
+  Eigen::Matrix3d cov = position_cov / (s * s) + age * age * velocity_cov;
+  if (layout.drift >= 0) cov += covariance.block<3, 3>(layout.drift, layout.drift) / (s * s);
+  covariance.block<3, 3>(kPosition, kPosition) = 0.5 * (cov + cov.transpose());
+  bank_.start(filter().time_ns(), state, covariance);
+  follows_odometry_ = true;
+  next_status_ |= kReinitialised;
+  ++counts_["odometry.world_adopted"];
+}
+
+void InertialFusion::fuse_as_relative(const OdometryMeasurement& odometry, const Eigen::Matrix3d& position_cov,
+                                      const Eigen::Matrix3d& orientation_cov) {
+  if (odometry.rotation.coeffs().hasNaN() || options_.filter.clones == 0) {
+    ++counts_["odometry.skipped.incomplete"];
+    return;
+  }
+  const double since = pose_before_ ? to_seconds(odometry.time_ns - pose_before_->time_ns) : kUnknown;
+  if (since >= 0 && since < options_.odometry_interval_s) {
+    ++counts_["odometry.between"];
+    return;
+  }
+  const std::optional<OdometryMeasurement> before = pose_before_;
+  pose_before_ = odometry;
+  pose_before_->position_cov = position_cov;
+  pose_before_->orientation_cov = orientation_cov;
+  if (!before || !(since > 0)) {
+    bank_.fuse([&](ErrorStateFilter& one) { return one.keep_pose(odometry.time_ns); });
+    return;
+  }
+  const Eigen::Quaterniond from = before->rotation.inverse();
+  const Eigen::Matrix3d R0 = from.toRotationMatrix();
+  const Eigen::Quaterniond rotation = from * odometry.rotation;
+  const Eigen::Matrix3d R10 = rotation.toRotationMatrix().transpose();
+  const Eigen::Vector3d position = from * (odometry.position - before->position);
+  const Eigen::Matrix3d relative_cov = R0 * (before->position_cov + position_cov) * R0.transpose();
+  const Eigen::Matrix3d turn_cov = orientation_cov + R10 * before->orientation_cov * R10.transpose();
+  take_note(bank_.fuse([&](ErrorStateFilter& one) {
+    return one.fuse_vo_relative(before->time_ns, odometry.time_ns, position, relative_cov, rotation, turn_cov);
+  }));
+}
+
+void InertialFusion::take_note(const FusionResult& result) {
+  switch (result.outcome) {
+    case FusionOutcome::kTooLate:
+      next_status_ |= kTooLate;
+      return;
+    case FusionOutcome::kNotFinite:
+      next_status_ |= kNotFinite;
+      return;
+    case FusionOutcome::kBadCovariance:
+      next_status_ |= kBadCovariance;
+      return;
+    case FusionOutcome::kAccepted:
+    case FusionOutcome::kGated:
+      break;
+    default:
+      return;
+  }
+  const bool gps = result.source == FusionSource::kGps;
+  const bool odometry = result.source == FusionSource::kOdometry || result.source == FusionSource::kRelativeOdometry;
+  if (!gps && !odometry) return;
+  Watch& watch = watches_[result.source];
+  if (result.accepted()) {
+    watch.rejected = 0;
+    watch.since_ns = kNoTime;
+    if (++watch.accepted >= options_.reject_count) watch.widened = 0;
+    return;
+  }
+  watch.accepted = 0;
+  if (watch.rejected++ == 0) watch.since_ns = result.time_ns;
+  if (watch.rejected >= kToldAfter) next_status_ |= gps ? kGpsRejected : kOdometryRejected;
+  if (watch.rejected >= options_.reject_count &&
+      to_seconds(result.time_ns - watch.since_ns) >= options_.reject_time_s) {
+    recover(result, watch);
+  }
+}
+
+// The residual says by how much the state may be off.
+void InertialFusion::recover(const FusionResult& result, Watch& watch) {
+  next_status_ |= kRecovered;
+  if (result.source == FusionSource::kGps && watch.widened > 0) {
+    // It did not help: attitude or heading are wrong. GPS begins again from the level.
+    start_anew(kReinitialised | kRecovered);
+    carried_->heading_known = false;
+    anchored_ = heading_known_ = false;
+    return;
+  }
+  const ErrorStateLayout& layout = filter().layout();
+  const double scale = filter().state().scale;
+  const double over = std::max(options_.reject_time_s, to_seconds(result.time_ns - watch.since_ns));
+  const Eigen::Index most = std::min<Eigen::Index>(3, result.residual.size());
+  double off = result.residual.head(most).norm();
+  if (result.source != FusionSource::kGps) off /= std::max(std::abs(scale), 1e-3);
+  Eigen::VectorXd variances = Eigen::VectorXd::Zero(layout.size);
+  variances.segment<3>(kTheta).setConstant(square(kAttitudeDoubt));
+  variances.segment<3>(kVelocity).setConstant(square(off / over));
+  if (result.source != FusionSource::kRelativeOdometry) variances.segment<3>(kPosition).setConstant(square(off));
+  if (result.source != FusionSource::kGps && layout.scale >= 0) variances[layout.scale] = square(kScaleDoubt * scale);
+  bank_.widen(variances);
+  if (result.source == FusionSource::kOdometry && watch.widened > 0) odometry_left_world_ = true;
+  ++watch.widened;
+  watch.rejected = 0;
+  watch.since_ns = kNoTime;
+  ++counts_["widened"];
+}
+
+}  // namespace loc
