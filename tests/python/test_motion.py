@@ -179,7 +179,11 @@ def test_integrals_of_velocity_and_acceleration(motion):
     end = min(motion.duration_s, 120)
     t = np.linspace(0, end, 60_001)
     states = motion.sample(t)
-    for value, rate in [(states.position, states.velocity), (states.velocity, states.acceleration)]:
+    for value, rate in [
+        (states.position, states.velocity),
+        (states.velocity, states.acceleration),
+        (states.angular_velocity, states.angular_acceleration),
+    ]:
         np.testing.assert_allclose(value[-1] - value[0], simpson(rate, x=t, axis=0), atol=1e-5)
     rotation = to_scipy(states.q_world_body_wxyz)
     step = (rotation[:-1].inv() * rotation[1:]).as_rotvec()

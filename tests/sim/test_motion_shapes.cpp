@@ -138,7 +138,7 @@ TEST(HandHeldMotion, SeedScaleAndSwitches) {
 }
 
 TEST(GroundMotion, DerivativesAreConsistentAndContinuous) {
-  const auto check = [](const Motion& motion, std::vector<double> times) {
+  const auto check = [](const Motion& motion, const std::vector<double>& times) {
     test::check_derivatives(motion, test::spread_times(motion.duration_s(), 300));
     // The jerk jumps between phases, which differences across feel.
     test::MotionCheck beside;

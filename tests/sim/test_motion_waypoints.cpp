@@ -1,7 +1,10 @@
 // Motion through way-points, and the curves that it is made of.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <numbers>
 
@@ -108,10 +111,11 @@ TEST(Clothoid, BadInput) {
 TEST(PiecewiseCubic, SplineIsTheCubicItself) {
   const auto cubic = [](double x) { return 2 + x * (-1 + x * (0.5 - 0.3 * x)); };
   const std::vector<double> knots = {-1, 0.2, 0.5, 2, 2.1, 4};
-  std::vector<double> values;
-  for (const double x : knots) values.push_back(cubic(x));
+  std::vector<double> values(knots.size());
+  std::transform(knots.begin(), knots.end(), values.begin(), cubic);
   const PiecewiseCubic spline = PiecewiseCubic::spline(knots, values);
-  for (double x = -1.5; x < 4.5; x += 0.01) {
+  for (int k = 0; k < 600; ++k) {
+    const double x = -1.5 + 0.01 * k;
     EXPECT_NEAR(spline.at(x).value, cubic(x), 1e-12);
     EXPECT_NEAR(spline.at(x).rate, -1 + x - 0.9 * x * x, 1e-11);
     EXPECT_NEAR(spline.at(x).acceleration, 1 - 1.8 * x, 1e-10);
@@ -145,8 +149,8 @@ TEST(PiecewiseCubic, ShapePreservingStaysBetweenTheValues) {
   for (std::size_t i = 0; i < values.size(); ++i) knots.push_back(static_cast<double>(i * i) + 1);
   const PiecewiseCubic cubic = PiecewiseCubic::shape_preserving(knots, values);
   for (std::size_t i = 0; i + 1 < knots.size(); ++i) {
-    for (double u = 0; u <= 1; u += 0.01) {
-      const double y = cubic.at(knots[i] + u * (knots[i + 1] - knots[i]), i).value;
+    for (int k = 0; k <= 100; ++k) {
+      const double y = cubic.at(knots[i] + 0.01 * k * (knots[i + 1] - knots[i]), i).value;
       EXPECT_GE(y, std::min(values[i], values[i + 1]) - 1e-14);
       EXPECT_LE(y, std::max(values[i], values[i + 1]) + 1e-14);
     }
