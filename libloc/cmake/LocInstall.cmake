@@ -22,6 +22,10 @@ install(DIRECTORY "${PROJECT_BINARY_DIR}/msgs/generated/loc" DESTINATION "${loc_
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/msgs/" DESTINATION "${CMAKE_INSTALL_DATADIR}/libloc/msgs"
   COMPONENT development FILES_MATCHING PATTERN "*.lcm")
 
+set(loc_installs_vision FALSE)
+if(TARGET loc_vision)
+  set(loc_installs_vision TRUE)
+endif()
 configure_package_config_file("${CMAKE_CURRENT_LIST_DIR}/liblocConfig.cmake.in"
   "${PROJECT_BINARY_DIR}/liblocConfig.cmake" INSTALL_DESTINATION "${loc_package_dir}"
   NO_SET_AND_CHECK_MACRO NO_CHECK_REQUIRED_COMPONENTS_MACRO)
@@ -30,5 +34,5 @@ write_basic_package_version_file("${PROJECT_BINARY_DIR}/liblocConfigVersion.cmak
 install(FILES
   "${PROJECT_BINARY_DIR}/liblocConfig.cmake" "${PROJECT_BINARY_DIR}/liblocConfigVersion.cmake"
   "${CMAKE_CURRENT_LIST_DIR}/FindGeographicLib.cmake" "${CMAKE_CURRENT_LIST_DIR}/FindLCM.cmake"
-  "${CMAKE_CURRENT_LIST_DIR}/FindMatio.cmake"
+  "${CMAKE_CURRENT_LIST_DIR}/FindMatio.cmake" "${CMAKE_CURRENT_LIST_DIR}/FindOpenCV.cmake"
   DESTINATION "${loc_package_dir}" COMPONENT development)

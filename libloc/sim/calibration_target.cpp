@@ -93,8 +93,7 @@ Scene april_grid(const AprilGridModel& model) {
       }
     }
   }
-  // The small black squares between the tags make every tag's corner one of four fields.
-  for (int row = 0; row <= model.rows; ++row) {
+  for (int row = 0; row <= model.rows && model.corner_squares; ++row) {
     for (int column = 0; column <= model.columns; ++column) {
       const Eigen::Vector2d low(column * pitch - gap, row * pitch - gap);
       texture.patches.push_back({low, low + Eigen::Vector2d(gap, gap), kBlack});

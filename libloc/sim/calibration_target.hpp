@@ -32,6 +32,9 @@ struct AprilGridModel {
   double tag_m = 0.088;  ///< side of a tag, black border included
   double spacing = 0.3;  ///< space between tags, as a share of tag_m
   int first_tag = 0;     ///< number of the lower left tag in the family
+  /// Small black squares between the tags, which make every tag's corner one of four fields, as on Kalibr's boards.
+  /// Detectors that look for closed outlines (AprilTag 3) miss tags with them.
+  bool corner_squares = true;
 
   /// @throws std::invalid_argument naming the field and its value; also for more tags than the family has.
   void check() const;
