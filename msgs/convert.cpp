@@ -192,6 +192,20 @@ estimate_t to_message(const Estimate& e, const std::string& method, const std::s
   return out;
 }
 
+std::optional<fusion_t> to_fusion_message(const Estimate& e) {
+  if ((e.valid & kValidScale) == 0 && std::isnan(e.origin.latitude)) return std::nullopt;
+  fusion_t out{};
+  out.time_ns = e.time_ns;
+  out.host_time_ns = e.host_time_ns;
+  out.sequence = e.sequence;
+  out.scale = e.scale;
+  out.scale_sigma = e.scale_sigma;
+  out.origin_latitude = e.origin.latitude;
+  out.origin_longitude = e.origin.longitude;
+  out.origin_altitude = e.origin.altitude;
+  return out;
+}
+
 clock_t to_message(const ClockLine& line) {
   clock_t out{};
   out.input_ref_ns = line.input_ref_ns;
@@ -371,6 +385,18 @@ Estimate from_message(const estimate_t& m) {
     }
   }
   return out;
+}
+
+void add_message(const fusion_t& m, Estimate& e) {
+  require_time(m.time_ns, "fusion_t", "an estimate");
+  if (m.time_ns != e.time_ns) reject("fusion_t.time_ns", m.time_ns, "is not that of the estimate");
+  if (m.sequence != e.sequence) reject("fusion_t.sequence", m.sequence, "is not that of the estimate");
+  require_angle("fusion_t.origin_latitude", m.origin_latitude, std::numbers::pi / 2, "[-pi/2, pi/2]");
+  require_angle("fusion_t.origin_longitude", m.origin_longitude, 2 * std::numbers::pi, "[-2 pi, 2 pi]");
+  if (m.scale_sigma < 0) throw DataError("fusion_t.scale_sigma = " + to_text(m.scale_sigma) + ": must not be negative");
+  e.scale = m.scale;
+  e.scale_sigma = m.scale_sigma;
+  e.origin = {m.origin_latitude, m.origin_longitude, m.origin_altitude};
 }
 
 ClockLine from_message(const clock_t& m) {

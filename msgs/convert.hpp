@@ -5,6 +5,7 @@
 // report it themselves.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "libloc/estimators/estimate.hpp"
@@ -12,6 +13,7 @@
 #include "libloc/sensors/measurements.hpp"
 #include "loc/clock_t.hpp"
 #include "loc/estimate_t.hpp"
+#include "loc/fusion_t.hpp"
 #include "loc/gps_fix_t.hpp"
 #include "loc/image_t.hpp"
 #include "loc/imu_t.hpp"
@@ -31,6 +33,9 @@ odometry_t to_message(const OdometryMeasurement& m);
 tracks_t to_message(const FeaturesMeasurement& m);
 /// @param method, world as in estimate_t
 estimate_t to_message(const Estimate& e, const std::string& method, const std::string& world);
+/// What an estimate_t does not hold: readers of estimates need not know of it, and estimate_t stays what it is.
+/// @returns nullopt for an estimate that has no scale and no origin.
+std::optional<fusion_t> to_fusion_message(const Estimate& e);
 
 /// The line only: who sends it, when, and how good it is, is filled in by the sender.
 clock_t to_message(const ClockLine& line);
@@ -43,12 +48,15 @@ ReferenceMeasurement from_message(const reference_t& m);
 OdometryMeasurement from_message(const odometry_t& m);
 FeaturesMeasurement from_message(const tracks_t& m);
 Estimate from_message(const estimate_t& m);
+/// Fills in scale and origin. @throws DataError also when it belongs to another estimate (time, sequence).
+void add_message(const fusion_t& m, Estimate& e);
 ClockLine from_message(const clock_t& m);
 
 /// Channel of each stream, unless the user names another: LOC_IMU, LOC_MAGNETOMETER, LOC_IMAGE, LOC_GPS, LOC_REFERENCE,
 /// LOC_ODOMETRY, LOC_TRACKS (features).
 const char* default_channel(StreamKind kind);
 inline constexpr const char* kEstimateChannel = "LOC_ESTIMATE";
+inline constexpr const char* kFusionChannel = "LOC_FUSION";
 inline constexpr const char* kStatisticsChannel = "LOC_STATISTICS";
 inline constexpr const char* kClockChannel = "LOC_CLOCK";
 inline constexpr const char* kSourceStatusChannel = "LOC_SOURCE_STATUS";

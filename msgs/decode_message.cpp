@@ -2,6 +2,7 @@
 #include "libloc/core/check.hpp"
 #include "loc/clock_t.hpp"
 #include "loc/estimate_t.hpp"
+#include "loc/fusion_t.hpp"
 #include "loc/gps_fix_t.hpp"
 #include "loc/image_t.hpp"
 #include "loc/imu_t.hpp"
@@ -77,6 +78,7 @@ T decode_message(std::span<const std::uint8_t> data) {
 
 template clock_t decode_message<clock_t>(std::span<const std::uint8_t>);
 template estimate_t decode_message<estimate_t>(std::span<const std::uint8_t>);
+template fusion_t decode_message<fusion_t>(std::span<const std::uint8_t>);
 template gps_fix_t decode_message<gps_fix_t>(std::span<const std::uint8_t>);
 template image_t decode_message<image_t>(std::span<const std::uint8_t>);
 template imu_t decode_message<imu_t>(std::span<const std::uint8_t>);

@@ -4,6 +4,7 @@
 #include "tools/support/any_estimator.hpp"
 #include "tools/support/channels.hpp"
 #include "tools/support/estimate_output.hpp"
+#include "tools/support/fusion_options.hpp"
 #include "tools/support/live_estimator.hpp"
 #include "tools/support/open_source.hpp"
 #include "tools/support/pipeline.hpp"
@@ -22,33 +23,50 @@ struct Arguments {
   double beta = 0;
   bool no_magnetometer = false;
   double reorder_delay_ms = 50;
+  loc::FusionArguments fusion;
+  std::string start = "auto";
   loc::SourceSpec input;
   std::string output;
 };
 
-loc::EstimatorSettings settings_of(const Arguments& arguments, bool beta_given) {
-  loc::EstimatorSettings settings;
-  settings.method = arguments.method;
-  settings.use_magnetometer = !arguments.no_magnetometer;
-  settings.madgwick = loc::MadgwickOptions::preset(arguments.preset);
-  if (beta_given) settings.madgwick.beta = arguments.beta;
-  settings.madgwick.world = loc::parse_world_frame(arguments.world);
-  return settings;
-}
-
-int run_offline(const Arguments& arguments, loc::AnyEstimator estimator) {
+loc::SourceSpec input_of(const Arguments& arguments) {
   loc::SourceSpec input = arguments.input;
   if (input.kind.empty()) input.kind = loc::guess_source_kind(input.path);
   input.decode.channels = arguments.live.channels;
+  return input;
+}
+
+loc::EstimatorSettings settings_of(const Arguments& arguments, const loc::Rig& rig, bool beta_given) {
+  loc::EstimatorSettings settings;
+  settings.method = arguments.method;
+  settings.use_magnetometer = !arguments.no_magnetometer;
+  if (arguments.method == "madgwick") {
+    settings.madgwick = loc::MadgwickOptions::preset(arguments.preset);
+    if (beta_given) settings.madgwick.beta = arguments.beta;
+    settings.madgwick.world = loc::parse_world_frame(arguments.world);
+    return settings;
+  }
+  if (loc::parse_world_frame(arguments.world) != loc::WorldFrame::kEnu) {
+    throw loc::UsageError("--world " + arguments.world + ": error-state estimates in ENU only");
+  }
+  settings.fusion = loc::fusion_options(arguments.fusion, arguments.preset, rig);
+  if (arguments.start == "reference") {
+    const auto source = loc::open_source(input_of(arguments));
+    settings.fusion.given_start = loc::start_from_reference(*source, settings.fusion, arguments.preset);
+  }
+  return settings;
+}
+
+int run_offline(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimator estimator) {
+  const loc::SourceSpec input = input_of(arguments);
   loc::refuse_to_overwrite(input.path, arguments.output);
   const auto source = loc::open_source(input);
   const auto output = loc::open_estimate_output(arguments.output, estimator.method(), estimator.world());
   std::int64_t estimates = 0;
-  loc::EstimatorPipeline pipeline(std::move(estimator), loc::load_rig(arguments.config), arguments.live.merger,
-                                  [&](const loc::Estimate& estimate) {
-                                    ++estimates;
-                                    output->write(estimate);
-                                  });
+  loc::EstimatorPipeline pipeline(std::move(estimator), rig, arguments.live.merger, [&](const loc::Estimate& estimate) {
+    ++estimates;
+    output->write(estimate);
+  });
   while (auto measurement = source->next()) {
     if (loc::stop_requested()) break;
     pipeline.push(std::move(*measurement));
@@ -73,8 +91,8 @@ int run_offline(const Arguments& arguments, loc::AnyEstimator estimator) {
   return loc::stop_requested() ? loc::kExitFailed : loc::kExitOk;
 }
 
-int run_live(const Arguments& arguments, loc::AnyEstimator estimator) {
-  loc::LiveEstimator live(arguments.live, std::move(estimator), loc::load_rig(arguments.config));
+int run_live(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimator estimator) {
+  loc::LiveEstimator live(arguments.live, std::move(estimator), rig);
   spdlog::info("event=started method={} preset={} world={} url={}", arguments.method, arguments.preset, arguments.world,
                arguments.live.lcm_url);
   live.run();
@@ -89,7 +107,9 @@ int run_live(const Arguments& arguments, loc::AnyEstimator estimator) {
 
 int main(int argc, char** argv) {
   Arguments arguments;
-  loc::Program program("loc-estimator", "Estimates orientation from the measurements on LCM, or in a recording.");
+  loc::Program program("loc-estimator",
+                       "Estimates orientation (madgwick) or a whole trajectory (error-state: IMU with GPS, odometry, "
+                       "magnetometer) from the measurements on LCM, or in a recording.");
   CLI::App& app = program.app();
   arguments.live.lcm_url.clear();
   program.add_lcm_url(arguments.live.lcm_url);
@@ -97,14 +117,17 @@ int main(int argc, char** argv) {
   app.add_option("--method", arguments.method, "Estimator")
       ->check(CLI::IsMember(loc::estimator_methods()))
       ->capture_default_str();
-  app.add_option("--preset", arguments.preset, "madgwick: report (the plain form), robust (for real sensors)")
-      ->check(CLI::IsMember({"report", "robust"}))
+  app.add_option("--preset", arguments.preset,
+                 "robust (for real sensors); madgwick: report (the plain form); error-state: as_published, 16, 19 (the "
+                 "visual-inertial example)")
+      ->check(CLI::IsMember({"report", "robust", "as_published", "16", "19"}))
       ->capture_default_str();
   CLI::Option* beta = app.add_option("--beta", arguments.beta, "madgwick: gain [rad/s] in place of the preset's");
   app.add_option("--world", arguments.world, "Axes of world: ENU, NWU, NED")
       ->check(CLI::IsMember({"ENU", "NWU", "NED"}, CLI::ignore_case))
       ->capture_default_str();
   app.add_flag("--no-magnetometer", arguments.no_magnetometer, "Heading from the gyroscope alone");
+  loc::add_fusion_options(app, arguments.fusion);
   loc::add_channel_option(app, arguments.channels);
   app.add_option("--estimate-channel", arguments.live.estimate_channel, "Channel of the estimates")
       ->capture_default_str();
@@ -124,12 +147,20 @@ int main(int argc, char** argv) {
   CLI::Option* output =
       app.add_option("--output", arguments.output, "Off line: *.csv, *.tum, or *.lcm (an LCM log)")->needs(input);
   input->needs(output);
+  app.add_option("--start", arguments.start,
+                 "error-state, off line: auto (from the first second), reference (as the recording's reference says)")
+      ->check(CLI::IsMember({"auto", "reference"}))
+      ->capture_default_str();
 
   return program.run(argc, argv, [&] {
     arguments.live.channels = loc::parse_channels(arguments.channels);
     arguments.live.merger.max_delay_ns = loc::from_seconds(arguments.reorder_delay_ms * 1e-3);
-    loc::AnyEstimator estimator = loc::make_estimator(settings_of(arguments, beta->count() > 0));
-    return input->count() > 0 ? run_offline(arguments, std::move(estimator))
-                              : run_live(arguments, std::move(estimator));
+    if (arguments.start == "reference" && (input->count() == 0 || arguments.method != "error-state")) {
+      throw loc::UsageError("--start reference: for --method error-state with --input only");
+    }
+    const loc::Rig rig = loc::load_rig(arguments.config);
+    loc::AnyEstimator estimator = loc::make_estimator(settings_of(arguments, rig, beta->count() > 0));
+    return input->count() > 0 ? run_offline(arguments, rig, std::move(estimator))
+                              : run_live(arguments, rig, std::move(estimator));
   });
 }

@@ -1,5 +1,7 @@
 #include "libloc/io/csv.hpp"
 
+#include <array>
+#include <cmath>
 #include <deque>
 
 #include "libloc/core/check.hpp"
@@ -62,7 +64,8 @@ CsvWriter::CsvWriter(const std::filesystem::path& path) : path_(path), file_(pat
            "bgx_rad_s,bgy_rad_s,bgz_rad_s,bax_m_s2,bay_m_s2,baz_m_s2,"
            "sigma_theta_x_rad,sigma_theta_y_rad,sigma_theta_z_rad,sigma_px_m,sigma_py_m,sigma_pz_m,"
            "sigma_vx_m_s,sigma_vy_m_s,sigma_vz_m_s,sigma_bgx_rad_s,sigma_bgy_rad_s,sigma_bgz_rad_s,"
-           "sigma_bax_m_s2,sigma_bay_m_s2,sigma_baz_m_s2,valid,status,sequence\n";
+           "sigma_bax_m_s2,sigma_bay_m_s2,sigma_baz_m_s2,valid,status,sequence,scale,sigma_scale,"
+           "origin_latitude_rad,origin_longitude_rad,origin_altitude_m\n";
   if (!file_) throw DataError(path_.string() + ": cannot be written");
 }
 
@@ -81,7 +84,12 @@ void CsvWriter::write(const Estimate& e) {
     const double sigma = i < dim ? std::sqrt(e.covariance(i, i)) : 0;
     append(line, i < dim, &sigma, 1);
   }
-  line += ',' + std::to_string(e.valid) + ',' + std::to_string(e.status) + ',' + std::to_string(e.sequence) + '\n';
+  line += ',' + std::to_string(e.valid) + ',' + std::to_string(e.status) + ',' + std::to_string(e.sequence);
+  const std::array<double, 2> scale{e.scale, e.scale_sigma};
+  append(line, (e.valid & kValidScale) != 0, scale.data(), 2);
+  const std::array<double, 3> origin{e.origin.latitude, e.origin.longitude, e.origin.altitude};
+  append(line, std::isfinite(e.origin.latitude), origin.data(), 3);
+  line += '\n';
   file_ << line;
   if (!file_) throw DataError(path_.string() + ": writing failed");
 }

@@ -62,8 +62,8 @@ std::unique_ptr<MeasurementSource> open_csv(const std::filesystem::path& path, c
 
 /// Writes estimates, one line each: time_ns, quaternion w x y z, position [m], velocity [m/s], angular velocity
 /// [rad/s], biases [rad/s, m/s^2], the deviations of the 15 errors (theta [rad], position, velocity, biases), the bits
-/// valid and status, sequence. What an estimate does not hold is left empty. Numbers are written so that reading gives
-/// the same double.
+/// valid and status, sequence, the odometry's scale and its deviation, the origin of world [rad, rad, m]. What an
+/// estimate does not hold is left empty. Numbers are written so that reading gives the same double.
 class CsvWriter {
  public:
   /// @throws DataError when the file cannot be written.

@@ -49,6 +49,8 @@ class StreamMerger {
   /// The next sample in time order that may leave. Of samples that wait with equal times: magnetometer, image (by
   /// camera), features (by camera), GPS, odometry, reference, IMU, so that an IMU step finds what belongs to its time.
   std::optional<Measurement> pop();
+  /// A sample of this time would come too late.
+  bool has_passed(TimeNs time_ns) const { return last_out_ != kNoTime && time_ns < last_out_; }
   /// From here on pop() gives all that waits (end of the recording).
   void finish();
 

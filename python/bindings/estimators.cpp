@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <variant>
 
@@ -303,6 +304,7 @@ void bind_estimate(py::module_& m) {
       .value("GYROSCOPE_BIAS", loc::kValidGyroscopeBias)
       .value("ACCELEROMETER_BIAS", loc::kValidAccelerometerBias)
       .value("COVARIANCE", loc::kValidCovariance)
+      .value("SCALE", loc::kValidScale)
       .finalize();
   py::native_enum<loc::EstimateStatus>(
       m, "EstimateStatus", "enum.IntFlag",
@@ -318,6 +320,12 @@ void bind_estimate(py::module_& m) {
       .value("TIME_NOT_INCREASING", loc::kTimeNotIncreasing)
       .value("GAP", loc::kGap)
       .value("OUT_OF_RANGE", loc::kOutOfRange)
+      .value("BRIDGED", loc::kBridged)
+      .value("GPS_REJECTED", loc::kGpsRejected)
+      .value("ODOMETRY_REJECTED", loc::kOdometryRejected)
+      .value("RECOVERED", loc::kRecovered)
+      .value("TOO_LATE", loc::kTooLate)
+      .value("BAD_COVARIANCE", loc::kBadCovariance)
       .finalize();
   using loc::Estimate;
   py::class_<Estimate>(m, "Estimate", "What an estimator says after one measurement.")
@@ -342,7 +350,17 @@ void bind_estimate(py::module_& m) {
           [](const Estimate& e) {
             return to_matrix_array(e.covariance.topLeftCorner(e.covariance_dim, e.covariance_dim));
           },
-          "(d, d), of the error (theta [rad, body axes], p, v, bg, ba); d = 0: none");
+          "(d, d), of the error (theta [rad, body axes], p, v, bg, ba); d = 0: none")
+      .def_readonly("scale", &Estimate::scale, "of the odometry: its unit per metre; NaN when it is not estimated")
+      .def_readonly("scale_sigma", &Estimate::scale_sigma, "its deviation")
+      .def_property_readonly(
+          "origin",
+          [](const Estimate& e) {
+            std::optional<std::tuple<double, double, double>> out;
+            if (!std::isnan(e.origin.latitude)) out.emplace(e.origin.latitude, e.origin.longitude, e.origin.altitude);
+            return out;
+          },
+          "Latitude, longitude [rad] and altitude [m] of world's origin; None when nothing ties it to the Earth.");
 }
 
 void bind_filter(py::module_& m) {

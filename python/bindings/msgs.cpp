@@ -34,11 +34,12 @@ TypeEntry entry() {
           [](std::span<const std::uint8_t> data) { static_cast<void>(loc::decode_message<T>(data)); }};
 }
 
-const std::array<TypeEntry, 12>& types() {
-  static const std::array<TypeEntry, 12> all = {
+const std::array<TypeEntry, 13>& types() {
+  static const std::array<TypeEntry, 13> all = {
       entry<loc::imu_t>(),        entry<loc::magnetometer_t>(),  entry<loc::image_t>(),  entry<loc::gps_fix_t>(),
       entry<loc::reference_t>(),  entry<loc::estimate_t>(),      entry<loc::tracks_t>(), entry<loc::map_points_t>(),
-      entry<loc::statistics_t>(), entry<loc::source_status_t>(), entry<loc::clock_t>(),  entry<loc::odometry_t>()};
+      entry<loc::statistics_t>(), entry<loc::source_status_t>(), entry<loc::clock_t>(),  entry<loc::odometry_t>(),
+      entry<loc::fusion_t>()};
   return all;
 }
 
@@ -72,6 +73,7 @@ void bind_msgs(py::module_& m) {
       },
       "Fingerprint of each LCM type of package loc, as the C++ library has it.");
   m.attr("ESTIMATE_CHANNEL") = loc::kEstimateChannel;
+  m.attr("FUSION_CHANNEL") = loc::kFusionChannel;
   m.attr("STATISTICS_CHANNEL") = loc::kStatisticsChannel;
   m.attr("SOURCE_STATUS_CHANNEL") = loc::kSourceStatusChannel;
   m.attr("IMU_CHANNEL") = loc::default_channel(loc::StreamKind::kImu);

@@ -356,7 +356,7 @@ TEST_F(Csv, the_locale_does_not_matter) {
   writer.flush();
   const std::string text = test::read_file(folder_.path() / "e.csv");
   EXPECT_NE(text.find("\n1234567,,,,,1234.5,0.25,-1e+06,"), std::string::npos) << text;
-  EXPECT_TRUE(text.ends_with(",5678\n")) << text;
+  EXPECT_TRUE(text.ends_with(",5678,,,,,\n")) << text;
 }
 
 TEST_F(Csv, reads_a_real_calibration_recording) {
@@ -402,7 +402,14 @@ TEST_F(Csv, writer_gives_back_what_it_was_given) {
   }
   EXPECT_NE(row.find(",,,,,,"), std::string::npos) << "no position, no velocity";
   EXPECT_NE(row.find(",0.02,0.02,0.02,,,"), std::string::npos) << row;
-  EXPECT_TRUE(row.ends_with(",81,4,4\n")) << row;
+  EXPECT_TRUE(row.ends_with(",81,4,4,,,,,\n")) << row;
+  e.valid |= kValidScale;
+  e.scale = 2;
+  e.scale_sigma = 0.125;
+  e.origin = {0.5, -1.5, 300};
+  writer.write(e);
+  writer.flush();
+  EXPECT_TRUE(test::read_file(path).ends_with(",209,4,4,2,0.125,0.5,-1.5,300\n")) << test::read_file(path);
   EXPECT_THROW(CsvWriter(folder_.path() / "none" / "e.csv"), DataError);
 }
 

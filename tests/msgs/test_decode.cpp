@@ -37,6 +37,7 @@ TEST(DecodeMessage, gives_back_every_type_of_the_package) {
   check(to_message(test::magnetometer_sample()));
   check(to_message(test::odometry_sample()));
   check(to_message(test::features_sample()));
+  check(fusion_t{});
 }
 
 template <class T>
@@ -61,6 +62,7 @@ TEST(DecodeMessage, refuses_a_message_cut_at_any_byte_or_with_a_byte_too_many) {
   expect_cut_or_longer_is_refused(test::clock_message());
   expect_cut_or_longer_is_refused(to_message(test::odometry_sample()));
   expect_cut_or_longer_is_refused(to_message(test::features_sample()));
+  expect_cut_or_longer_is_refused(fusion_t{});
 }
 
 // Every int32 of the message in turn becomes a length that no message has: nothing may be allocated for it, nothing

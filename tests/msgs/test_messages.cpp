@@ -33,6 +33,7 @@ TEST(Messages, FingerprintsAreFrozen) {
   EXPECT_EQ(hash(statistics_t::getHash()), 0x2f2b80d43dc8bfd9U);
   EXPECT_EQ(hash(source_status_t::getHash()), 0xd63ab9362bc56f14U);
   EXPECT_EQ(hash(odometry_t::getHash()), 0x1157247bdae507a3U);
+  EXPECT_EQ(hash(fusion_t::getHash()), 0x50f7ee53ce7e222dU);
   EXPECT_EQ(hash(clock_t::getHash()), 0xafbc08ec99f516dbU);
 }
 
@@ -261,6 +262,37 @@ TEST(Messages, EstimateRoundTripWithCovariance) {
   EXPECT_EQ((back.covariance.topLeftCorner<6, 6>()), (estimate.covariance.topLeftCorner<6, 6>()));
 }
 
+TEST(Messages, FusionRoundTrip) {
+  Estimate estimate;
+  estimate.time_ns = 42;
+  estimate.sequence = 44;
+  EXPECT_FALSE(to_fusion_message(estimate)) << "nothing to say";
+  estimate.valid = kValidScale;
+  estimate.scale = 2.125;
+  estimate.scale_sigma = 0.25;
+  estimate.origin = {0.6, -1.5, 301};
+  const fusion_t message = over_the_wire(*to_fusion_message(estimate));
+  Estimate back;
+  back.time_ns = 42;
+  back.sequence = 44;
+  add_message(message, back);
+  EXPECT_EQ(back.scale, 2.125);
+  EXPECT_EQ(back.scale_sigma, 0.25);
+  EXPECT_EQ(back.origin.longitude, -1.5);
+  EXPECT_EQ(back.origin.altitude, 301);
+  estimate.valid = 0;
+  EXPECT_TRUE(to_fusion_message(estimate)) << "an origin alone";
+  const auto refused = [&](auto change, const std::string& what) {
+    fusion_t wrong = message;
+    change(wrong);
+    EXPECT_THROW(add_message(wrong, back), DataError) << what;
+  };
+  refused([](fusion_t& m) { m.time_ns = 43; }, "another estimate");
+  refused([](fusion_t& m) { m.sequence = 43; }, "another estimate");
+  refused([](fusion_t& m) { m.origin_latitude = 48; }, "degrees");
+  refused([](fusion_t& m) { m.scale_sigma = -1; }, "scale_sigma");
+}
+
 // The bits of a message are those of the library: from_message() and to_message() pass them on as a number.
 TEST(Messages, BitsAreThoseOfTheLibrary) {
   EXPECT_EQ(estimate_t::VALID_ORIENTATION, static_cast<int>(kValidOrientation));
@@ -270,6 +302,13 @@ TEST(Messages, BitsAreThoseOfTheLibrary) {
   EXPECT_EQ(estimate_t::STATUS_MAGNETOMETER_DISTURBED, static_cast<int>(kMagnetometerDisturbed));
   EXPECT_EQ(estimate_t::STATUS_NOT_FINITE, static_cast<int>(kNotFinite));
   EXPECT_EQ(estimate_t::STATUS_GAP, static_cast<int>(kGap));
+  EXPECT_EQ(estimate_t::VALID_SCALE, static_cast<int>(kValidScale));
+  EXPECT_EQ(estimate_t::STATUS_BRIDGED, static_cast<int>(kBridged));
+  EXPECT_EQ(estimate_t::STATUS_GPS_REJECTED, static_cast<int>(kGpsRejected));
+  EXPECT_EQ(estimate_t::STATUS_ODOMETRY_REJECTED, static_cast<int>(kOdometryRejected));
+  EXPECT_EQ(estimate_t::STATUS_RECOVERED, static_cast<int>(kRecovered));
+  EXPECT_EQ(estimate_t::STATUS_TOO_LATE, static_cast<int>(kTooLate));
+  EXPECT_EQ(estimate_t::STATUS_BAD_COVARIANCE, static_cast<int>(kBadCovariance));
   EXPECT_EQ(image_t::PIXEL_FORMAT_GRAY, static_cast<int>(PixelFormat::kGray));
   EXPECT_EQ(image_t::PIXEL_FORMAT_BGR, static_cast<int>(PixelFormat::kBgr));
   EXPECT_EQ(image_t::PIXEL_FORMAT_RGB, static_cast<int>(PixelFormat::kRgb));

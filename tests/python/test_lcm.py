@@ -15,6 +15,7 @@ from libloc import DataError
 FINGERPRINTS = {
     "clock_t": 0xAFBC08EC99F516DB,
     "estimate_t": 0xA4E5476EEF3B739B,
+    "fusion_t": 0x50F7EE53CE7E222D,
     "gps_fix_t": 0x64D7E0398F38FE74,
     "image_t": 0xCA5A4D4CB4B858C2,
     "imu_t": 0x6E15AF9AA7F2F0BD,

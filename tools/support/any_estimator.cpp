@@ -20,7 +20,17 @@ AnyEstimator make_madgwick(const EstimatorSettings& settings) {
   return {"madgwick", world_frame_name(settings.madgwick.world), std::move(inputs), MadgwickFilter(settings.madgwick)};
 }
 
-constexpr std::array kMethods = {Method{"madgwick", make_madgwick}};
+AnyEstimator make_error_state(const EstimatorSettings& settings) {
+  InertialFusionOptions options = settings.fusion;
+  options.use_magnetometer = settings.use_magnetometer;
+  std::vector<StreamKind> inputs = {StreamKind::kImu};
+  if (options.use_magnetometer) inputs.push_back(StreamKind::kMagnetometer);
+  if (options.use_gps) inputs.push_back(StreamKind::kGps);
+  if (options.use_odometry) inputs.push_back(StreamKind::kOdometry);
+  return {"error-state", world_frame_name(WorldFrame::kEnu), std::move(inputs), InertialFusion(options)};
+}
+
+constexpr std::array kMethods = {Method{"madgwick", make_madgwick}, Method{"error-state", make_error_state}};
 
 }  // namespace
 
@@ -46,6 +56,11 @@ AnyEstimator::AnyEstimator(std::string method, std::string world, std::vector<St
 
 bool AnyEstimator::takes(StreamKind kind) const {
   return std::find(inputs_.begin(), inputs_.end(), kind) != inputs_.end();
+}
+
+bool AnyEstimator::takes_late(StreamKind kind) const {
+  return std::holds_alternative<InertialFusion>(implementation_) &&
+         (kind == StreamKind::kGps || kind == StreamKind::kOdometry);
 }
 
 bool AnyEstimator::process(const Measurement& measurement) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "libloc/estimators/estimator.hpp"
+#include "libloc/estimators/inertial_fusion.hpp"
 #include "libloc/estimators/madgwick.hpp"
 
 namespace loc {
@@ -15,6 +16,7 @@ struct EstimatorSettings {
   std::string method = "madgwick";
   bool use_magnetometer = true;
   MadgwickOptions madgwick = MadgwickOptions::robust();
+  InertialFusionOptions fusion = InertialFusionOptions::robust();  ///< its use_magnetometer is overruled
 };
 
 /// Names that make_estimator() knows.
@@ -22,7 +24,7 @@ std::vector<std::string> estimator_methods();
 
 class AnyEstimator {
  public:
-  using Implementation = std::variant<MadgwickFilter>;
+  using Implementation = std::variant<MadgwickFilter, InertialFusion>;
 
   AnyEstimator(std::string method, std::string world, std::vector<StreamKind> inputs, Implementation implementation);
 
@@ -31,6 +33,8 @@ class AnyEstimator {
   /// Streams that it takes.
   const std::vector<StreamKind>& inputs() const { return inputs_; }
   bool takes(StreamKind kind) const;
+  /// It puts samples of this kind where they belong, though later ones have been there already.
+  bool takes_late(StreamKind kind) const;
 
   // Estimator concept.
   bool process(const Measurement& measurement);

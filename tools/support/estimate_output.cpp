@@ -74,6 +74,11 @@ class LogOutput : public EstimateOutput {
     bytes_.resize(static_cast<std::size_t>(message.getEncodedSize()));
     message.encode(bytes_.data(), 0, static_cast<int>(bytes_.size()));
     writer_.write(estimate.time_ns / 1000, kEstimateChannel, bytes_);
+    if (const auto more = to_fusion_message(estimate)) {
+      bytes_.resize(static_cast<std::size_t>(more->getEncodedSize()));
+      more->encode(bytes_.data(), 0, static_cast<int>(bytes_.size()));
+      writer_.write(estimate.time_ns / 1000, kFusionChannel, bytes_);
+    }
   }
   void finish() override { writer_.flush(); }
 

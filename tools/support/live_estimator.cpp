@@ -188,6 +188,7 @@ void LiveEstimator::publish_estimate(const Estimate& estimate) {
   if (publisher_.publish(options_.estimate_channel, message) && estimate.host_time_ns != kNoTime) {
     latency_.add(message.publish_time_ns - estimate.host_time_ns);
   }
+  if (const auto more = to_fusion_message(estimate)) publisher_.publish(options_.fusion_channel, *more);
 }
 
 void LiveEstimator::publish_statistics() {

@@ -21,6 +21,7 @@ struct LiveEstimatorOptions {
   std::string lcm_url = kDefaultLcmUrl;
   std::array<std::string, kStreamKinds> channels;  ///< empty: default_channel()
   std::string estimate_channel = "LOC_ESTIMATE";
+  std::string fusion_channel = "LOC_FUSION";
   StreamMergerOptions merger;
   std::size_t queue_capacity = 16384;  ///< messages of each stream but images
   std::size_t image_capacity = 4;

@@ -68,6 +68,11 @@ void EstimatorPipeline::push(Measurement measurement) {
   const std::int64_t resets = merger_.counts().resets;
   measurement = calibrated(rig_, std::move(measurement));
   units_.see(measurement);
+  if (estimator_.takes_late(kind_of(measurement)) && merger_.has_passed(stamp_of(measurement).time_ns)) {
+    ++passed_late_[measurement.index()];
+    process(measurement);
+    return;
+  }
   merger_.push(std::move(measurement));
   if (merger_.counts().resets != resets) {
     // All that had waited leaves first; the clock was set back between it and this sample.
@@ -107,6 +112,7 @@ NamedCounts EstimatorPipeline::counts() const {
     out.push_back({name + ".restarts", sequence.restarts});
     out.push_back({name + ".late", merger.late[index]});
     out.push_back({name + ".absurd_time", merger.absurd[index]});
+    if (estimator_.takes_late(kind)) out.push_back({name + ".passed_late", passed_late_[index]});
   }
   out.push_back({"clock.resets", merger.resets});
   out.push_back({"merger.forced", merger.forced});

@@ -1,4 +1,5 @@
 // From measurements in order of arrival to estimates: sequence check, calibration, merging in time order, estimator.
+// What comes too late for the order goes to the estimator all the same, when that has a use for it (takes_late).
 // Live and off line run through this same class, which knows no files and no sockets: what differs is only who pushes
 // and who takes the estimates.
 #pragma once
@@ -71,6 +72,7 @@ class EstimatorPipeline {
   Sink sink_;
   bool ended_ = false;
   std::int64_t estimates_ = 0;
+  std::array<std::int64_t, kStreamKinds> passed_late_{};
 };
 
 }  // namespace loc
