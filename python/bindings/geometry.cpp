@@ -1,8 +1,9 @@
-// geometry/: rotations (submodule so3) and rigid transforms.
+// geometry/: rotations (submodule so3), rigid transforms, places on the Earth.
 #include <pybind11/typing.h>
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "libloc/geometry/geodesy.hpp"
 #include "libloc/geometry/pose3.hpp"
 #include "libloc/geometry/so3.hpp"
 
@@ -201,11 +202,45 @@ void bind_pose3(py::module_& m) {
           }));
 }
 
+void bind_local_frame(py::module_& m) {
+  using loc::GeodeticPoint;
+  using loc::LocalFrame;
+  const auto point = [](const double* row) { return GeodeticPoint{row[0], row[1], row[2]}; };
+  py::class_<LocalFrame>(
+      m, "LocalFrame",
+      "East, north, up of an origin on WGS 84 [m]: a plane that touches the ellipsoid, valid at any distance.")
+      .def(py::init<double, double, double>(), py::arg("latitude"), py::arg("longitude"), py::arg("altitude"),
+           "[rad], [rad], [m] above the ellipsoid.")
+      .def(
+          "to_local",
+          [point](const LocalFrame& self, const ArrayLike& points) {
+            const RowArgument a(points, "latitude_longitude_altitude", 3);
+            return map_rows(a, 3, [&](auto i, double* out) { set3(out, self.to_local(point(a.row(i)))); });
+          },
+          py::arg("latitude_longitude_altitude"), "(3,) or (N, 3) [rad, rad, m] to east, north, up [m].")
+      .def(
+          "to_geodetic",
+          [](const LocalFrame& self, const ArrayLike& positions) {
+            const RowArgument a(positions, "position", 3);
+            return map_rows(a, 3, [&](auto i, double* out) {
+              const GeodeticPoint p = self.to_geodetic(a.vector(i));
+              set3(out, {p.latitude, p.longitude, p.altitude});
+            });
+          },
+          py::arg("position"), "(3,) or (N, 3), east, north, up [m] to latitude, longitude [rad] and altitude [m].")
+      .def("__repr__", [](const LocalFrame& self) {
+        const GeodeticPoint& o = self.origin();
+        return py::str("LocalFrame(latitude={}, longitude={}, altitude={})")
+            .format(o.latitude, o.longitude, o.altitude);
+      });
+}
+
 }  // namespace
 
 void bind_geometry(py::module_& m) {
   bind_so3(m);
   bind_pose3(m);
+  bind_local_frame(m);
 }
 
 }  // namespace locpy

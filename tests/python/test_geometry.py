@@ -119,3 +119,22 @@ def test_properties_are_copies():
     assert np.array_equal(pose.translation, [1, 2, 3])
     assert "translation=[1.0, 2.0, 3.0]" in repr(pose)
     assert isinstance(libloc.so3.exp([0, 0, 0]), np.ndarray)
+
+
+def test_local_frame():
+    origin = np.array([0.7610, 0.0251, 150.0])
+    frame = libloc.LocalFrame(*origin)
+    assert np.allclose(frame.to_local(origin), 0, atol=1e-8)
+    # Radii of curvature of WGS 84 at the origin; small steps, so that the plane is the surface.
+    a, e2 = 6378137.0, 0.00669437999014
+    w = np.sqrt(1 - e2 * np.sin(origin[0]) ** 2)
+    meridian, prime = a * (1 - e2) / w**3, a / w
+    step = np.array([2e-6, -3e-6, 4.0])
+    expected = [step[1] * (prime + 150) * np.cos(origin[0]), step[0] * (meridian + 150), step[2]]
+    assert np.allclose(frame.to_local(origin + step), expected, atol=1e-3)
+    positions = RNG.normal(scale=500.0, size=(20, 3))
+    assert np.allclose(frame.to_local(frame.to_geodetic(positions)), positions, atol=1e-7)
+    with pytest.raises(ValueError, match="latitude"):
+        libloc.LocalFrame(2.0, 0.0, 0.0)
+    with pytest.raises(ValueError, match="latitude_longitude_altitude"):
+        frame.to_local([0.0, 0.0])
