@@ -13,7 +13,6 @@
 // Frames: world ENU; body x forward, y left, z up.
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <vector>
 
