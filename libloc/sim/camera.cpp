@@ -26,6 +26,7 @@ void CameraModel::check() const {
   require_not_negative("border_px", border_px);
   require_not_negative("min_depth_m", min_depth_m);
   require(max_depth_m > min_depth_m, "max_depth_m", max_depth_m, "must be greater than min_depth_m");
+  require_not_negative("min_separation_px", min_separation_px);
   require(max_features >= 0, "max_features", max_features, "must not be negative");
   require_share("outlier_rate", outlier_rate);
   require_share("wrong_id_rate", wrong_id_rate);
@@ -74,7 +75,7 @@ void CameraSimulator::look(const Pose3& T_world_camera) {
 
 void CameraSimulator::update_tracks() {
   std::vector<std::size_t> candidates;
-  std::size_t tracked = 0;
+  taken_.clear();
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     Track& track = tracks_[i];
     const bool seen = in_view_[i].point >= 0;
@@ -85,22 +86,28 @@ void CameraSimulator::update_tracks() {
     } else if (track.status == Status::kNew && seen) {
       candidates.push_back(i);
     }
-    if (track.status == Status::kTracked) ++tracked;
+    if (track.status == Status::kTracked) taken_.push_back(in_view_[i].pixel_px);
   }
   std::size_t room = candidates.size();
   if (model_.max_features > 0) {
     const auto limit = static_cast<std::size_t>(model_.max_features);
-    room = std::min(room, limit - std::min(limit, tracked));
+    room = std::min(room, limit - std::min(limit, taken_.size()));
   }
   fill_up(candidates, room);
 }
 
-// Takes so many of the candidates, any of them.
+bool CameraSimulator::has_space(const Eigen::Vector2d& pixel) const {
+  const double square = model_.min_separation_px * model_.min_separation_px;
+  return std::ranges::none_of(taken_, [&](const Eigen::Vector2d& p) { return (p - pixel).squaredNorm() < square; });
+}
+
+// Takes so many of the candidates, any of them that have space.
 void CameraSimulator::fill_up(std::vector<std::size_t>& candidates, std::size_t room) {
-  for (std::size_t k = 0; k < room; ++k) {
+  for (std::size_t k = 0; k < candidates.size() && room > 0; ++k) {
     const auto left = static_cast<double>(candidates.size() - k);
     std::swap(candidates[k], candidates[k + static_cast<std::size_t>(tracking_.uniform() * left)]);
     const std::size_t i = candidates[k];
+    if (!has_space(in_view_[i].pixel_px)) continue;
     Track& track = tracks_[i];
     if (track.status == Status::kNew) {
       track.id = static_cast<std::int64_t>(i);
@@ -108,6 +115,8 @@ void CameraSimulator::fill_up(std::vector<std::size_t>& candidates, std::size_t 
       track.id = next_id_++;
     }
     track.status = Status::kTracked;
+    taken_.push_back(in_view_[i].pixel_px);
+    --room;
   }
 }
 

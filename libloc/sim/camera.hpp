@@ -29,20 +29,21 @@
 namespace loc {
 
 struct CameraModel {
-  double rate_hz = 20;         ///< frames, from time 0 of the motion on (simulate_camera)
-  TimeNs start_time_ns = 0;    ///< time 0 of the motion on the IMU's clock
-  double stamp_jitter_s = 0;   ///< deviation of a frame's time stamp
-  double sigma_px = 0.5;       ///< white noise of each coordinate; also what the measurement says of itself
-  double border_px = 2;        ///< features nearer to the image's border are not found
-  double min_depth_m = 0.1;    ///< along the optical axis (fisheye: the distance); nearer points are not seen
-  double max_depth_m = 200;    ///< farther ones neither
-  bool occlusion = true;       ///< faces of the scene hide what is behind them
-  int max_features = 200;      ///< tracked at the same time; 0: no limit
-  double outlier_rate = 0;     ///< share of observations that are anywhere in the image
-  double wrong_id_rate = 0;    ///< share of observations that have changed identities with another one of the frame
-  double loss_rate = 0;        ///< probability of losing a track that is in view, per frame
-  double reappear_rate = 0.3;  ///< probability of finding a lost feature that is in view, per frame
-  double new_id_rate = 0;      ///< share of found ones that get a new identity, as trackers without memory give them
+  double rate_hz = 20;            ///< frames, from time 0 of the motion on (simulate_camera)
+  TimeNs start_time_ns = 0;       ///< time 0 of the motion on the IMU's clock
+  double stamp_jitter_s = 0;      ///< deviation of a frame's time stamp
+  double sigma_px = 0.5;          ///< white noise of each coordinate; also what the measurement says of itself
+  double border_px = 2;           ///< features nearer to the image's border are not found
+  double min_depth_m = 0.1;       ///< along the optical axis (fisheye: the distance); nearer points are not seen
+  double max_depth_m = 200;       ///< farther ones neither
+  bool occlusion = true;          ///< faces of the scene hide what is behind them
+  int max_features = 200;         ///< tracked at the same time; 0: no limit
+  double min_separation_px = 10;  ///< a new feature is not taken nearer to another one, as detectors spread them
+  double outlier_rate = 0;        ///< share of observations that are anywhere in the image
+  double wrong_id_rate = 0;       ///< share of observations that have changed identities with another one of the frame
+  double loss_rate = 0;           ///< probability of losing a track that is in view, per frame
+  double reappear_rate = 0.3;     ///< probability of finding a lost feature that is in view, per frame
+  double new_id_rate = 0;         ///< share of found ones that get a new identity, as trackers without memory give them
 
   /// @throws std::invalid_argument naming the field and its value.
   void check() const;
@@ -87,6 +88,7 @@ class CameraSimulator {
   void look(const Pose3& T_world_camera);
   void update_tracks();
   void fill_up(std::vector<std::size_t>& candidates, std::size_t room);
+  bool has_space(const Eigen::Vector2d& pixel_px) const;
   void disturb(SimulatedFrame& frame);
 
   CameraModel model_;
@@ -97,6 +99,7 @@ class CameraSimulator {
   Random noise_, outliers_, identities_, tracking_, stamps_;
   std::vector<Track> tracks_;              // of each point of the scene
   std::vector<ObservationTruth> in_view_;  // of each point of the scene; point = -1 where it is not seen
+  std::vector<Eigen::Vector2d> taken_;     // pixels of the features of this frame
   std::int64_t next_id_;
   std::int64_t sequence_ = 0;
   double last_time_s_ = -std::numeric_limits<double>::infinity();

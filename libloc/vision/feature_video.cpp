@@ -126,11 +126,11 @@ void VideoFile::add(const ImageMeasurement& image) {
 void VideoFile::finish() {
   writer_->writer.release();
   const std::string name = writer_->path.string();
-  // A full disk or a broken encoder is not reported by the writer: count what can be read.
+  if (writer_->frames == 0) return;
+  // The writer says nothing of a full disk or a broken encoder: see what the file says of itself, and that it begins.
   const Silence silence;
   cv::VideoCapture file(name, cv::CAP_FFMPEG);
-  std::int64_t frames = 0;
-  while (file.isOpened() && file.grab()) ++frames;
+  const auto frames = file.isOpened() && file.grab() ? std::llround(file.get(cv::CAP_PROP_FRAME_COUNT)) : 0;
   if (frames != writer_->frames) {
     throw DataError(name + ": " + std::to_string(frames) + " pictures can be read of " +
                     std::to_string(writer_->frames) + " that were written");

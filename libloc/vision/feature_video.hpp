@@ -58,7 +58,8 @@ class VideoFile {
 
   /// @throws std::invalid_argument for another size.
   void add(const ImageMeasurement& image);
-  /// Closes the file and reads it again: @throws DataError unless it holds all pictures. To be called at the end.
+  /// Closes the file and opens it again: @throws DataError unless it holds as many pictures as were added. To be called
+  /// at the end.
   void finish();
   /// Four letters, as the file names it.
   const std::string& codec() const;

@@ -10,6 +10,7 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "fields.hpp"
 #include "libloc/estimators/error_state_filter.hpp"
 #include "libloc/estimators/fusion_preset.hpp"
 #include "recording.hpp"
@@ -29,21 +30,6 @@ using loc::PredictOutcome;
 
 Eigen::Matrix3d matrix3(const ArrayLike& array, const char* name) {
   return matrix(array, name, 3, 3);
-}
-
-/// Fields of a plain struct by their Python names: Options(clones=1). TypeError names one that it does not have.
-template <class T>
-std::unique_ptr<T> with_fields(const char* type, const py::kwargs& fields) {
-  auto value = std::make_unique<T>();
-  const py::object self = py::cast(value.get(), py::return_value_policy::reference);
-  for (const auto& [name, field] : fields) {
-    if (!py::hasattr(self, name)) {
-      throw py::type_error(std::string(type) + " has no field " + py::cast<std::string>(name));
-    }
-    py::setattr(self, name, field);
-  }
-  value->check();
-  return value;
 }
 
 /// A stream of measurements as arrays, and what becomes of them.

@@ -20,4 +20,5 @@ PYBIND11_MODULE(_core, m) {
   locpy::bind_nmea(m);
   locpy::bind_msgs(m);
   locpy::bind_motion(m);
+  locpy::bind_camera(m);
 }

@@ -54,6 +54,7 @@ CameraModel exact() {
   model.sigma_px = 0;
   model.max_features = 0;
   model.reappear_rate = 1;
+  model.min_separation_px = 0;
   return model;
 }
 
@@ -236,6 +237,17 @@ TEST(CameraSimulator, LimitsOfNumberDepthAndBorderHold) {
   }
   EXPECT_EQ(most, 40U);
   EXPECT_GT(ids.size(), 200U);  // new ones take the places of those that went out of view
+}
+
+TEST(CameraSimulator, NewFeaturesKeepTheirDistance) {
+  CameraModel model = exact();
+  model.min_separation_px = 40;
+  const auto frames = simulate_camera(Turning(), model, calibration(), room(), Random(1), 0);
+  const auto& truth = frames.at(0).truth;
+  EXPECT_GT(truth.size(), 40U);
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) EXPECT_GE((truth[i].pixel_px - truth[k].pixel_px).norm(), 40);
+  }
 }
 
 TEST(CameraSimulator, WallsHideWhatIsBehindThem) {
