@@ -10,6 +10,7 @@ World has z up (ENU); body x forward, y left, z up. Nothing here needs a screen.
 from libloc.driving.animation import AnimationOptions as AnimationOptions
 from libloc.driving.animation import DrivingAnimation as DrivingAnimation
 from libloc.driving.animation import animate as animate
+from libloc.driving.log import run_of_log as run_of_log
 from libloc.driving.run import DrivingRun as DrivingRun
 from libloc.driving.run import Estimate as Estimate
 from libloc.driving.run import Odometry as Odometry

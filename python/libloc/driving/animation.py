@@ -1,4 +1,4 @@
-"""The drive as a moving picture: road, buildings, the true vehicle (solid) and the estimated one (transparent).
+"""The drive as a moving picture: road, buildings, the true vehicle (solid), the estimated one (transparent).
 
 A camera follows the true vehicle; a map shows the whole drive; text says time, errors and scale.
 """
@@ -74,6 +74,11 @@ def rotation_matrix(q_wxyz: Floats) -> Floats:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def _at(t_s: float, times_s: Floats, rows: Floats) -> Floats:
+    """Row (k,) of (N, k), between the neighbours."""
+    return np.array([np.interp(t_s, times_s, column) for column in rows.T])
 
 
 class _House:
@@ -174,8 +179,7 @@ class DrivingAnimation:
 
     def _pose(self, t_s: float, position: Floats, q_wxyz: Floats) -> tuple[Floats, Floats]:
         at = np.array([self.run.times_ns[0] + round(t_s * 1e9)], dtype=np.int64)
-        p = np.array([np.interp(t_s, self.run.times_s, column) for column in position.T])
-        return p, interpolated_rotation(at, self.run.times_ns, q_wxyz)[0]
+        return _at(t_s, self.run.times_s, position), interpolated_rotation(at, self.run.times_ns, q_wxyz)[0]
 
     def true_pose(self, t_s: float) -> tuple[Floats, Floats]:
         """Position (3,) and q_world_body_wxyz (4,)"""
@@ -274,13 +278,14 @@ class DrivingAnimation:
         if np.linalg.norm(building.corners.mean(axis=0) - vehicle[:2]) > 80:
             return False
         t = np.linspace(0, 1, 40)[:, None]
-        sight = eye + t * (vehicle + [0, 0, 0.7] - eye)
+        sight = eye + t * (vehicle + np.array([0, 0, 0.7]) - eye)
         low = sight[sight[:, 2] < building.ground + building.height + 1.0]
         if not len(low):
             return False
         c = building.corners
         edges = np.roll(c, -1, axis=0) - c
-        outwards = np.stack([edges[:, 1], -edges[:, 0]], axis=1) / np.linalg.norm(edges, axis=1, keepdims=True)
+        outwards = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
+        outwards /= np.linalg.norm(edges, axis=1, keepdims=True)
         distance = np.einsum("tck,ck->tc", low[:, None, :2] - c, outwards)
         return bool(np.any(np.all(distance < 1.5, axis=1)))
 
@@ -323,7 +328,7 @@ class DrivingAnimation:
         sigma = self.run.estimated("position_sigma")
         if sigma is None:
             return
-        now = np.array([np.interp(t_s, self.run.times_s, column) for column in sigma.T])
+        now = _at(t_s, self.run.times_s, sigma)
         if not np.isfinite(now).all() or now.max() > 200:
             return
         angle = np.linspace(0, 2 * np.pi, 49)
@@ -384,7 +389,7 @@ class DrivingAnimation:
 
     def _draw_text(self, canvas: Canvas, t_s: float) -> None:
         run, unit = self.run, self.options.height / 720
-        error = float(np.linalg.norm(np.array([np.interp(t_s, run.times_s, e) for e in run.position_error.T])))
+        error = float(np.linalg.norm(_at(t_s, run.times_s, run.position_error)))
         lines = [(f"{t_s:5.1f} s", True), (f"position error {error:.2f} m", False)]
         scale = run.estimated("scale")
         if scale is not None and np.isfinite(now := float(np.interp(t_s, run.times_s, scale))):
@@ -402,7 +407,8 @@ class DrivingAnimation:
             canvas.text((x + 0.7 * size, y), text, size, _INK, bold)
             y += row
         for text, colour, alpha in legend:
-            swatch = np.array([[0, 0], [1.5, 0], [1.5, 0.8], [0, 0.8]]) * size + [x + 0.7 * size, y + 0.2 * size]
+            corner = np.array([x + 0.7 * size, y + 0.2 * size])
+            swatch = corner + size * np.array([[0, 0], [1.5, 0], [1.5, 0.8], [0, 0.8]])
             canvas.flat_polygon(swatch, (*colour, alpha))
             canvas.flat_line(np.vstack([swatch, swatch[:2]]), (*colour, 255), 1.2 * unit)
             canvas.text((x + 2.7 * size, y), text, 0.85 * size, _INK)
@@ -420,7 +426,8 @@ def animate(
     """Writes the drive as a video and returns the number of pictures.
 
     path: .mp4 or .mkv (H.264; needs the Python package av), .gif, or a folder of .png. progress(done, all) is
-    called after each picture. Raises as write_video() and AnimationOptions.check() do, before anything is drawn.
+    called after each picture. Raises as write_video() and
+    AnimationOptions.check() do, before a picture is drawn.
     """
     check_video_path(Path(path), overwrite)
     animation = DrivingAnimation(run, scene, options)

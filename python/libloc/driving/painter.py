@@ -1,7 +1,7 @@
 """A pinhole camera and a canvas that draws polygons and lines of the world onto a picture.
 
-Camera axes: x right, y down, z forward. Pixels: (0, 0) is the centre of the upper left one. What is drawn later
-covers what was drawn before: the caller orders from far to near.
+Camera axes: x right, y down, z forward. Pixels: (0, 0) is the centre of the upper left one. What is drawn
+later covers what was drawn before: the caller orders from far to near.
 """
 
 from __future__ import annotations
@@ -136,7 +136,9 @@ class Canvas:
         if len(pixels) > 1:
             self._on(colour).line(self._points(pixels), fill=colour, width=self._width(width), joint="curve")
 
-    def flat_box(self, low: tuple[float, float], high: tuple[float, float], fill: Rgb | Rgba, radius: float) -> None:
+    def flat_box(
+        self, low: tuple[float, float], high: tuple[float, float], fill: Rgb | Rgba, radius: float
+    ) -> None:
         corners = self._points(np.array([low, high]))
         self._on(fill).rounded_rectangle(corners, radius * _SUPERSAMPLING, fill=fill)
 
@@ -144,7 +146,9 @@ class Canvas:
         (x, y), r = self._points(pixel), radius * _SUPERSAMPLING
         self._on(fill).ellipse([x - r, y - r, x + r, y + r], fill=fill, outline=outline, width=self._width(1))
 
-    def text(self, pixel: tuple[float, float], text: str, size: float, colour: Rgb, bold: bool = False) -> None:
+    def text(
+        self, pixel: tuple[float, float], text: str, size: float, colour: Rgb, bold: bool = False
+    ) -> None:
         x, y = self._points(np.array(pixel))
         self._solid.text((x, y), text, fill=colour, font=_font(round(size * _SUPERSAMPLING), bold))
 

@@ -121,9 +121,7 @@ def _interpolated(at_ns: NDArray[np.int64], times_ns: NDArray[np.int64], values:
     return np.stack([np.interp(x, xp, column) for column in values.T], axis=1)
 
 
-def interpolated_rotation(
-    at_ns: NDArray[np.int64], times_ns: NDArray[np.int64], q_wxyz: Floats
-) -> Floats:
+def interpolated_rotation(at_ns: NDArray[np.int64], times_ns: NDArray[np.int64], q_wxyz: Floats) -> Floats:
     """(K, 4): along the shortest way between the neighbours; the outermost ones beyond the ends."""
     after = np.clip(np.searchsorted(times_ns, at_ns), 1, len(times_ns) - 1)
     t0, t1 = times_ns[after - 1], times_ns[after]
@@ -134,7 +132,7 @@ def interpolated_rotation(
 
 @dataclass(frozen=True)
 class DrivingRun:
-    """Truth, estimate and odometry of one drive. Everything below is at the estimate's times that the truth covers."""
+    """Truth, estimate and odometry of a drive. All below is at the estimate's times that the truth covers."""
 
     truth: Truth
     estimate: Estimate
@@ -229,7 +227,7 @@ class DrivingRun:
 
     @cached_property
     def odometry_in_metres(self) -> tuple[NDArray[np.int64], Floats, str] | None:
-        """Times, positions divided by the scale, and which scale that is: the true one, else the last estimate."""
+        """Times, positions divided by the scale, and which scale: the true one, else the last estimate."""
         if self.odometry is None:
             return None
         truth, scale = self.true_value("odometry_scale"), self.estimated("scale")
@@ -263,9 +261,9 @@ def run_of_filter(
 ) -> DrivingRun:
     """What libloc.ErrorStateFilter.run gave, together with the truth.
 
-    times_ns: of the IMU samples that the filter was run with. truth: anything with the fields of Truth (such as
-    libloc.simulate(...).truth, or a Recording's reference, which has poses only). odometry: anything with
-    times_ns and position, absolute (a Recording's odometry).
+    times_ns: of the IMU samples that the filter was run with. truth: anything with the fields of Truth:
+    libloc.simulate(...).truth, or a Recording's reference, which has poses only. odometry: a Recording's, or
+    anything else with times_ns and position; absolute.
     Raises ValueError naming array, row and value.
     """
     if result.variances.shape[0] != len(times_ns):

@@ -120,7 +120,9 @@ def _overlap(a: Floats, b: Floats) -> bool:
     return True
 
 
-def _buildings(road: Floats, side: float, options: SceneOptions, random: Random, all_: list[Building]) -> None:
+def _buildings(
+    road: Floats, side: float, options: SceneOptions, random: Random, all_: list[Building]
+) -> None:
     """Adds those on one side (1: left, -1: right)."""
     line = DrivingScene(road, options.road_width_m, ()).edges(
         side * (options.road_width_m / 2 + options.pavement_m)
@@ -158,8 +160,8 @@ def _buildings(road: Floats, side: float, options: SceneOptions, random: Random,
 def scene_along(path: Floats, seed: int = 2, options: SceneOptions | None = None) -> DrivingScene:
     """Road and buildings along a path (N, 3) [m], such as the true positions of a drive.
 
-    Raises ValueError for a path that is not finite, shorter than 5 m or longer than 20 km, and naming an option
-    that is out of range.
+    Raises ValueError for a path that is not finite, shorter than 5 m or longer than 20 km, and naming an
+    option that is out of range.
     """
     options = options or SceneOptions()
     options.check()

@@ -1,4 +1,4 @@
-"""A drive in one picture: from above, and the errors over time with three deviations; drawn without a screen."""
+"""A drive in one picture: from above, and errors over time with three deviations; drawn without a screen."""
 
 from __future__ import annotations
 
@@ -75,10 +75,10 @@ def _draw_errors(
 
 
 def plot_summary(run: DrivingRun, title: str = "") -> Figure:
-    """Top view of truth, odometry divided by its scale, and fusion; errors of position, attitude, biases and scale.
+    """Top view of truth, odometry divided by its scale, and fusion; errors of pose, biases and scale.
 
-    Dotted: three deviations as the filter says. Biases and scale whose truth is not known are shown as estimated,
-    less their last value. What the estimate does not hold has no row.
+    Dotted: three deviations as the filter says. Biases and scale whose truth is not known are shown as
+    estimated, less their last value. What the estimate does not hold has no row.
     """
     rows: list[tuple[Floats, Floats | None, str, tuple[str, ...]]] = [
         (run.position_error, run.estimated("position_sigma"), "position [m]", ("x", "y", "z")),
@@ -140,7 +140,7 @@ def _degrees(values: Floats | None) -> Floats | None:
 
 
 def save_summary(run: DrivingRun, path: str | os.PathLike[str], title: str = "") -> None:
-    """plot_summary() as a picture of 1300 x 760 pixels; the format is that of the ending (.png, .svg, .pdf)."""
+    """plot_summary() as a picture of 1300 x 760 pixels; the ending says its format: .png, .svg, .pdf."""
     path = Path(path)
     if not path.parent.is_dir():
         raise FileNotFoundError(f"{path.parent}: no such folder")

@@ -1,4 +1,4 @@
-"""Writes pictures one after the other as a video: H.264 (.mp4, .mkv), an animated .gif, or a folder of .png."""
+"""Writes pictures one after the other: H.264 video (.mp4, .mkv), animated .gif, or a folder of .png."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _VIDEO, _GIF = (".mp4", ".mkv"), ".gif"
 
 
 class MissingPackageError(RuntimeError):
-    """An optional package is needed for what was asked for; the text says which, and what works without it."""
+    """An optional package is needed for what was asked for; the text says which, and what works without."""
 
 
 def check_video_path(path: Path, overwrite: bool) -> None:
@@ -45,22 +45,24 @@ def _av(path: Path):  # type: ignore[no-untyped-def]
         import av
     except ImportError:
         raise MissingPackageError(
-            f"{path}: videos need the Python package av (pip install av); "
-            f"{path.with_suffix(_GIF).name} or {path.with_suffix('').name}/ (a folder of .png) need nothing more"
+            f"{path}: videos need the Python package av (pip install av); {path.with_suffix(_GIF).name}, "
+            f"or {path.with_suffix('').name} (a folder of .png), needs nothing more"
         ) from None
     if "libx264" not in av.codecs_available:
         raise MissingPackageError(
-            f"{path}: this build of the Python package av cannot write H.264; that of PyPI can (pip install av); "
-            f"{path.with_suffix(_GIF).name} needs nothing more"
+            f"{path}: this build of the Python package av cannot write H.264, that of PyPI can; "
+            f"{path.with_suffix(_GIF).name}, or {path.with_suffix('').name} (a folder of .png), needs nothing"
         )
     return av
 
 
-def write_video(path: str | os.PathLike[str], frames: Iterable[Frame], rate_hz: float, overwrite: bool = False) -> int:
+def write_video(
+    path: str | os.PathLike[str], frames: Iterable[Frame], rate_hz: float, overwrite: bool = False
+) -> int:
     """Writes frames (height, width, 3) and returns how many. The file is there only when it is complete.
 
-    Raises ValueError for another ending, a rate that is not positive, frames that differ in size or none at all;
-    FileExistsError unless overwrite; MissingPackageError when the ending needs one.
+    Raises ValueError for another ending, a rate that is not positive, frames that differ in size or none at
+    all; FileExistsError unless overwrite; MissingPackageError when the ending needs one.
     """
     path = Path(path)
     if not 0 < rate_hz <= 240:
@@ -103,7 +105,7 @@ def _write_folder(path: Path, frames: Iterator[Frame]) -> int:
 
 
 def _write_gif(path: Path, frames: Iterator[Frame], rate_hz: float) -> int:
-    # One palette for all, of the first picture: otherwise colours flicker. GIF counts in hundredths of a second.
+    # One palette for all, of the first picture: otherwise colours flicker. GIF counts in 1/100 s.
     first = Image.fromarray(next(frames)).quantize(256, dither=Image.Dither.NONE)
     count = 1
 

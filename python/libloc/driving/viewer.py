@@ -36,9 +36,10 @@ def _rerun(path: Path) -> Any:
 def save_rerun(
     run: DrivingRun, scene: DrivingScene, path: str | os.PathLike[str], overwrite: bool = False
 ) -> None:
-    """Writes scene, both vehicles, trails, and errors with three deviations into an .rrd file, without a screen.
+    """Writes scene, both vehicles, trails, and errors with three deviations into an .rrd file, off screen.
 
-    Raises MissingPackageError without rerun-sdk, FileExistsError unless overwrite, ValueError for another ending.
+    Raises MissingPackageError without rerun-sdk, FileExistsError unless overwrite, ValueError for another
+    ending.
     """
     path = Path(path)
     if path.suffix != ".rrd":
@@ -65,7 +66,7 @@ def save_rerun(
 def view_rerun(path: str | os.PathLike[str]) -> subprocess.Popen[bytes]:
     """Starts the rerun viewer with an .rrd file and returns its process.
 
-    The viewer listens on 127.0.0.1 only. Its usage statistics are switched off for this user before it starts.
+    The viewer listens on 127.0.0.1 only. Its usage statistics are switched off for this user before.
     """
     path = Path(path)
     if not path.is_file():
@@ -93,7 +94,7 @@ def _log_scene(rr: Any, recording: Any, scene: DrivingScene) -> None:
     half = scene.road_width_m / 2
     vertices = np.stack([scene.edges(half), scene.edges(-half)], axis=1).reshape(-1, 3)
     i = 2 * np.arange(len(scene.road) - 1)[:, None]
-    triangles = np.concatenate([i + [0, 1, 2], i + [1, 3, 2]])
+    triangles = np.concatenate([i + np.array([0, 1, 2]), i + np.array([1, 3, 2])])
     recording.log(
         "world/road",
         rr.Mesh3D(
