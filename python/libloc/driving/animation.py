@@ -390,7 +390,7 @@ class DrivingAnimation:
     def _draw_text(self, canvas: Canvas, t_s: float) -> None:
         run, unit = self.run, self.options.height / 720
         error = float(np.linalg.norm(_at(t_s, run.times_s, run.position_error)))
-        lines = [(f"{t_s:5.1f} s", True), (f"position error {error:.2f} m", False)]
+        lines = [(f"{t_s:.1f} s", True), (f"position error {error:.2f} m", False)]
         scale = run.estimated("scale")
         if scale is not None and np.isfinite(now := float(np.interp(t_s, run.times_s, scale))):
             lines.append((f"odometry scale {now:.3f}", False))

@@ -22,8 +22,11 @@ def run_of_log(
     path: str | os.PathLike[str],
     recording: str | os.PathLike[str] | None = None,
     channel: str = libloc.ESTIMATE_CHANNEL,
+    truth_csv: str | os.PathLike[str] | None = None,
 ) -> tuple[DrivingRun, dict[str, int]]:
     """The drive in a log that holds estimates, and counts of what was left out of it and why.
+
+    truth_csv: what loc-simulate writes beside a recording (LOG.truth.csv); it knows biases and scale, too.
 
     recording: where truth (reference poses) and odometry are, in any form that read_recording() reads; by
     default the same log. Raises DataError naming file and what is missing or wrong.
@@ -33,7 +36,7 @@ def run_of_log(
     estimate = _estimate(path, channel, counts)
     data = libloc.read_recording(source)
     counts.update({name: n for name, n in data.counts.items() if n and "skipped" in name})
-    truth = _truth(source, data.reference, counts)
+    truth = _truth(source, data.reference, counts) if truth_csv is None else truth_of_csv(truth_csv)
     odometry = _odometry(data.odometry, counts)
     try:
         run = DrivingRun(truth, estimate, odometry)
@@ -42,6 +45,56 @@ def run_of_log(
     if run.without_truth:
         counts["estimate.without_truth"] = run.without_truth
     return run, counts
+
+
+_TRUTH_COLUMNS = {
+    "q_world_body_wxyz": [f"q_world_body_{axis}" for axis in "wxyz"],
+    "position": [f"position_{axis}_m" for axis in "xyz"],
+    "gyroscope_bias": [f"gyroscope_bias_{axis}_rad_s" for axis in "xyz"],
+    "accelerometer_bias": [f"accelerometer_bias_{axis}_m_s2" for axis in "xyz"],
+    "odometry_scale": ["odometry_scale"],
+}
+
+
+def truth_of_csv(path: str | os.PathLike[str]) -> Truth:
+    """truth.csv as loc-simulate writes it; an empty cell is not known.
+
+    Raises DataError naming file, line and column.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise DataError(f"{path}: no such file")
+    times: list[int] = []
+    values: list[list[float]] = []
+    with path.open(encoding="utf-8", errors="replace", newline="") as file:
+        heading = file.readline().strip().split(",")
+        wanted = ["time_ns", *(name for names in _TRUTH_COLUMNS.values() for name in names)]
+        missing = [name for name in wanted if name not in heading]
+        if missing:
+            raise DataError(f"{path}:1: no column {missing[0]}; this is not a truth.csv of loc-simulate")
+        at = [heading.index(name) for name in wanted]
+        for number, line in enumerate(file, start=2):
+            cells = line.strip().split(",")
+            if len(cells) != len(heading) or not line.endswith("\n"):
+                raise DataError(
+                    f"{path}:{number}: {len(cells)} cells, the heading has {len(heading)}, or it is cut"
+                )
+            try:
+                times.append(int(cells[at[0]]))
+                values.append([float(cells[i] or "nan") for i in at[1:]])
+            except ValueError as error:
+                raise DataError(f"{path}:{number}: {error}") from None
+    table = np.array(values, dtype=float).reshape(len(times), len(at) - 1)
+    columns: dict[str, Floats] = {}
+    first = 0
+    for name, parts in _TRUTH_COLUMNS.items():
+        part = table[:, first : first + len(parts)]
+        columns[name] = part[:, 0] if len(parts) == 1 else part
+        first += len(parts)
+    try:
+        return Truth(np.array(times, dtype=np.int64), **columns)
+    except ValueError as error:
+        raise DataError(f"{path}: {error}") from None
 
 
 def _in_order(times_ns: NDArray[np.int64]) -> NDArray[np.bool]:

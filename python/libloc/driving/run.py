@@ -22,7 +22,7 @@ _COLUMNS = {"q_world_body_wxyz": 4, "scale": 0, "scale_sigma": 0, "odometry_scal
 _NEEDED = ("times_ns", "q_world_body_wxyz", "position")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Truth:
     """N poses of the body. Biases and scale may be None (not known) and NaN at times where they are not."""
 
@@ -37,7 +37,7 @@ class Truth:
         _check(self, "truth")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Estimate:
     """N poses as estimated. What is not estimated is None; sigmas are deviations of one component."""
 
@@ -57,7 +57,7 @@ class Estimate:
         _check(self, "estimate")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Odometry:
     """Absolute odometry: M positions in its own unit."""
 
@@ -130,7 +130,7 @@ def interpolated_rotation(at_ns: NDArray[np.int64], times_ns: NDArray[np.int64],
     return so3.boxplus(q0, part * so3.boxminus(q_wxyz[after], q0))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class DrivingRun:
     """Truth, estimate and odometry of a drive. All below is at the estimate's times that the truth covers."""
 

@@ -52,7 +52,7 @@ class SceneOptions:
                 raise ValueError(f"scene.min_{what}_m = {low}: is more than the maximum, {high}")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Building:
     """A box that stands upright."""
 
@@ -62,7 +62,7 @@ class Building:
     colour: tuple[int, int, int]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class DrivingScene:
     road: Floats  #: (N, 3) its middle [m], places about 2 m apart
     road_width_m: float

@@ -40,8 +40,37 @@ def _draw_above(axes: Axes, run: DrivingRun) -> None:
     axes.annotate("start", run.true_position[0, :2], (6, 8), textcoords="offset points")
     axes.set(xlabel="x, east [m]", ylabel="y, north [m]", title="from above")
     axes.set_aspect("equal", adjustable="datalim")
-    axes.legend(loc="best", fontsize=9)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=3, fontsize=9, columnspacing=1.2)
     axes.grid(alpha=0.3)
+    _draw_inset(axes, run)
+
+
+def _draw_inset(axes: Axes, run: DrivingRun) -> None:
+    """The place of the largest error, enlarged, in the corner that the drive leaves free."""
+    path = run.true_position[:, :2]
+    low, size = path.min(axis=0), np.maximum(np.ptp(path, axis=0), 1e-9)
+    at = (path - low) / size
+    corners = [(0.0, 0.0), (0.58, 0.0), (0.0, 0.62), (0.58, 0.62)]
+    part = np.array([0.42, 0.38])  # of the drive's extent
+    taken = [np.sum(np.all((at >= corner) & (at <= corner + part), axis=1)) for corner in np.array(corners)]
+    if min(taken):
+        return
+    corner = corners[int(np.argmin(taken))]
+    worst = int(np.argmax(np.linalg.norm(run.position_error[:, :2], axis=1)))
+    centre, reach = path[worst], 4 * float(np.linalg.norm(run.position_error[worst, :2]))
+    if not 0 < reach < 0.2 * float(size.max()):
+        return
+    inset = axes.inset_axes((corner[0] + (0.02 if corner[0] else 0.07), corner[1] + 0.05, 0.34, 0.27))
+    if run.odometry_in_metres is not None:
+        inset.plot(*run.odometry_in_metres[1][:, :2].T, color=_ODOMETRY, lw=0.9)
+    inset.plot(*run.position[:, :2].T, color=_FUSED, lw=1.8)
+    inset.plot(*path.T, color=_TRUTH, lw=1.1, ls=(0, (5, 3)))
+    inset.set(xlim=(centre[0] - reach, centre[0] + reach), ylim=(centre[1] - reach, centre[1] + reach))
+    inset.set_aspect("equal")
+    inset.set_title(f"largest error, {run.times_s[worst]:.0f} s", fontsize=9)
+    inset.tick_params(labelsize=8)
+    inset.grid(alpha=0.3)
+    axes.indicate_inset_zoom(inset, edgecolor="0.4")
 
 
 def _draw_errors(

@@ -1,7 +1,7 @@
 """Shows a drive out of an LCM log: a picture of truth, odometry and fusion with their errors, and a video.
 
     loc-animate run.log --output show
-    loc-animate estimates.log --reference run.log --output show --rerun
+    loc-animate estimates.log --reference run.log --truth run.log.truth.csv --output show --rerun
 
 The log holds estimates with positions (of loc-estimator); truth and odometry are in the same log, or in the
 recording that --reference names. Writes summary.png, drive.mp4, and with --rerun drive.rrd.
@@ -28,6 +28,9 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("log", type=Path, help="LCM log with estimates")
     parser.add_argument(
         "--reference", type=Path, metavar="RECORDING", help="where truth and odometry are (default: the log)"
+    )
+    parser.add_argument(
+        "--truth", type=Path, metavar="CSV", help="LOG.truth.csv of loc-simulate: true biases and scale, too"
     )
     parser.add_argument(
         "--channel", default=libloc.ESTIMATE_CHANNEL, metavar="NAME", help="of the estimates (%(default)s)"
@@ -67,7 +70,7 @@ def run(options: argparse.Namespace) -> None:
         width=options.width, height=options.height, rate_hz=options.fps, speed=options.speed
     )
     animation.check()
-    drive, counts = driving.run_of_log(options.log, options.reference, options.channel)
+    drive, counts = driving.run_of_log(options.log, options.reference, options.channel, options.truth)
     for name, count in counts.items():
         print(f"{name} = {count}")
     print(f"{len(drive.times_s)} estimates over {drive.times_s[-1]:.2f} s")
