@@ -75,3 +75,15 @@ def test_calibrating_the_magnetometer_of_a_recording(tmp_path):
     write_csv(tmp_path / "still.csv", still)
     assert "refused" in run("03_calibrate_magnetometer.py", tmp_path / "still.csv", code=1)
     assert "no such file" in run("03_calibrate_magnetometer.py", tmp_path / "absent.csv", code=1)
+
+
+def test_visual_inertial(tmp_path):
+    arguments = ["--duration", 10, "--video", "none", "--output", tmp_path / "out"]
+    text = run("04_visual_inertial.py", *arguments)
+    # The drift of the odometry is 1.2 units; the filter does not know the scale at the start.
+    assert float(text.split("fused ")[1].split()[0]) < 4
+    assert abs(float(text.split("error ")[1].split()[0])) < 10
+    assert (tmp_path / "out/summary.png").stat().st_size > 50_000
+    assert "is longer than the motion" in run("04_visual_inertial.py", "--duration", 91, code=1)
+    source = (EXAMPLES / "04_visual_inertial.py").read_text()
+    assert source.count("\n") < 60
