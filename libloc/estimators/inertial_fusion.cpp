@@ -51,6 +51,12 @@ InertialFusionOptions InertialFusionOptions::robust() {
   options.filter.clones = 1;
   options.filter.estimate_drift = true;
   options.filter.scale_random_walk = 0.003;
+  // A vehicle's engine and road are in it, which a calibration at rest does not see.
+  options.filter.noise.gyroscope_noise_density = 5e-4;
+  options.filter.noise.accelerometer_noise_density = 1e-2;
+  options.gps_sigma_floor = 1;
+  options.gps_velocity_sigma_floor = 0.1;
+  options.gps_time_sigma = 0.05;
   return options;
 }
 
@@ -83,6 +89,9 @@ void InertialFusionOptions::check() const {
   require_positive("gps_fixed_part", gps_fixed_part);
   require_positive("gps_vertical_factor", gps_vertical_factor);
   require_positive("gps_velocity_sigma", gps_velocity_sigma);
+  require_not_negative("gps_sigma_floor", gps_sigma_floor);
+  require_not_negative("gps_velocity_sigma_floor", gps_velocity_sigma_floor);
+  require_not_negative("gps_time_sigma", gps_time_sigma);
   require_positive("gps_max_ahead_s", gps_max_ahead_s);
   require_positive("odometry_position_sigma", odometry_position_sigma);
   require_positive("odometry_orientation_sigma", odometry_orientation_sigma);

@@ -69,7 +69,13 @@ struct InertialFusionOptions {
   double gps_fixed_part = 0.006;       ///< of gps_sigma
   double gps_vertical_factor = 2;      ///< up against horizontal
   double gps_velocity_sigma = 0.3;     ///< [m/s]
-  double gps_max_ahead_s = 1;          ///< A fix that is further ahead of the IMU belongs to another clock. [s]
+  /// A receiver's covariance says how much fixes scatter. What they have in common for minutes (atmosphere, multipath)
+  /// and an error of their time stamps is not in it: deviations are at least these (RTK: as stated), and the way that
+  /// the body goes in the time is added.
+  double gps_sigma_floor = 0;           ///< horizontal, vertical by gps_vertical_factor [m]
+  double gps_velocity_sigma_floor = 0;  ///< [m/s]
+  double gps_time_sigma = 0;            ///< [s]
+  double gps_max_ahead_s = 1;           ///< A fix that is further ahead of the IMU belongs to another clock. [s]
 
   bool use_odometry = true;
   OdometryUse odometry = OdometryUse::kAutomatic;
@@ -176,7 +182,7 @@ class InertialFusion {
   StandStillDetector rest_;
 
   bool running_ = false;
-  bool heading_known_ = false;  // tied to north
+  bool heading_known_ = false;     // tied to north
   bool tied_ = false;              // GPS has said where world is
   bool anchored_ = false;          // GPS positions are in our world
   bool follows_odometry_ = false;  // our world is that of the absolute odometry

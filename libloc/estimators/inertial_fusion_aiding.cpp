@@ -21,6 +21,13 @@ double square(double x) {
   return x * x;
 }
 
+// Adds what the horizontal (and vertical) variances lack.
+void raise(Eigen::Matrix3d& cov, double sigma_floor, double vertical_factor) {
+  const double horizontal = square(sigma_floor) - 0.5 * (cov(0, 0) + cov(1, 1));
+  const double vertical = square(sigma_floor * vertical_factor) - cov(2, 2);
+  cov.diagonal() += Eigen::Vector3d(horizontal, horizontal, vertical).cwiseMax(0);
+}
+
 }  // namespace
 
 void InertialFusion::process_other(const Measurement& measurement) {
@@ -80,6 +87,13 @@ bool InertialFusion::prepare(const GpsMeasurement& gps, Eigen::Vector3d& positio
     return false;
   }
   position_cov = (turn * position_cov * turn.transpose()).eval();
+  raise(position_cov, gps.fix < GpsFixType::kFloat ? options_.gps_sigma_floor : 0, options_.gps_vertical_factor);
+  const Eigen::Vector3d way = options_.gps_time_sigma * filter().state().inertial.velocity;
+  if (heading_known_) {
+    position_cov += way * way.transpose();
+  } else {
+    position_cov += way.squaredNorm() * Eigen::Matrix3d::Identity();
+  }
   if (!has_height || gps.fix == GpsFixType::k2d) {
     position.z() = filter().state().inertial.position.z();
     position_cov.row(2).setZero();
@@ -92,6 +106,7 @@ bool InertialFusion::prepare(const GpsMeasurement& gps, Eigen::Vector3d& positio
     velocity_cov = gps.velocity_cov.hasNaN()
                        ? Eigen::Matrix3d(square(options_.gps_velocity_sigma) * Eigen::Matrix3d::Identity())
                        : Eigen::Matrix3d(turn * gps.velocity_cov * turn.transpose());
+    raise(velocity_cov, options_.gps_velocity_sigma_floor, 1);
   }
   return true;
 }

@@ -574,6 +574,33 @@ TEST(InertialFusion, OutliersAreRejected) {
   EXPECT_LT(d.position_error(d.estimates.back()).norm(), 5);
 }
 
+// Receivers state how much their fixes scatter, not that their stamps are off.
+TEST(InertialFusion, AReceiverThatBoastsIsSurvived) {
+  double nees[2] = {};
+  for (const bool floors : {true, false}) {
+    Drive d;
+    d.motion = car();
+    d.options.origin = d.world.origin();
+    d.gps_sigma = 0.3;
+    d.gps_velocity_sigma = 0.05;
+    d.change_gps = [](GpsMeasurement& fix, double) {
+      fix.time_ns += 80'000'000;
+      return true;
+    };
+    if (!floors) d.options.gps_sigma_floor = d.options.gps_velocity_sigma_floor = d.options.gps_time_sigma = 0;
+    d.run();
+    const std::int64_t gated = count(d.fusion->counts(), "gps.gated");
+    nees[floors ? 0 : 1] = d.mean_nees(25);
+    if (floors) {
+      EXPECT_EQ(gated, 0);
+      EXPECT_EQ(d.statuses & kRecovered, 0U);
+      EXPECT_LT(d.position_error(d.estimates.back()).norm(), 3);
+    }
+  }
+  EXPECT_LT(nees[0], 25);
+  EXPECT_GT(nees[1], 3 * nees[0]) << "the test would not notice";
+}
+
 TEST(InertialFusion, PresetsAndOptions) {
   for (const char* name : {"robust", "as_published", "16", "19"}) {
     Drive d;

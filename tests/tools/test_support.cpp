@@ -272,6 +272,38 @@ TEST(Pipeline, RigIsApplied) {
   EXPECT_LT(last.angular_velocity.norm(), 1e-12);
 }
 
+TEST(Pipeline, LateFixesGoToAnEstimatorThatCanUseThem) {
+  for (const char* method : {"error-state", "madgwick"}) {
+    EstimatorSettings settings;
+    settings.method = method;
+    EstimatorPipeline pipeline(make_estimator(settings), {}, {}, [](const Estimate&) {});
+    GpsMeasurement fix;
+    fix.fix = GpsFixType::k3d;
+    fix.latitude = 0.8;
+    fix.longitude = 0.1;
+    fix.altitude = 100;
+    for (int i = 0; i < 600; ++i) {
+      ImuMeasurement imu = imu_sample(i * 5 * kMs, i);
+      imu.angular_velocity.setZero();
+      pipeline.push(imu);
+      if (i % 100 == 90) {
+        fix.time_ns = imu.time_ns - 300 * kMs;
+        fix.sequence = i / 100;
+        pipeline.push(fix);
+      }
+    }
+    pipeline.end();
+    const NamedCounts counts = pipeline.counts();
+    EXPECT_EQ(value_of(counts, "estimates") > 300, true);
+    if (pipeline.estimator().takes(StreamKind::kGps)) {
+      EXPECT_EQ(value_of(counts, "gps.received"), 6);
+      EXPECT_EQ(value_of(counts, "gps.passed_late"), 6);
+      EXPECT_EQ(value_of(counts, "gps.late"), 0);
+      EXPECT_GE(value_of(counts, "gps.accepted"), 4);
+    }
+  }
+}
+
 TEST(AnyEstimator, NamesLeadToEstimators) {
   for (const std::string& name : estimator_methods()) {
     EstimatorSettings settings;
@@ -284,6 +316,13 @@ TEST(AnyEstimator, NamesLeadToEstimators) {
   EstimatorSettings six_axes;
   six_axes.use_magnetometer = false;
   EXPECT_FALSE(make_estimator(six_axes).takes(StreamKind::kMagnetometer));
+  six_axes.method = "error-state";
+  EXPECT_FALSE(make_estimator(six_axes).takes(StreamKind::kMagnetometer));
+  EXPECT_TRUE(make_estimator(six_axes).takes(StreamKind::kGps));
+  EXPECT_TRUE(make_estimator(six_axes).takes_late(StreamKind::kOdometry));
+  EXPECT_FALSE(make_estimator(six_axes).takes_late(StreamKind::kImu));
+  six_axes.fusion.use_gps = false;
+  EXPECT_FALSE(make_estimator(six_axes).takes(StreamKind::kGps));
 }
 
 TEST(Channels, AreParsedStrictly) {

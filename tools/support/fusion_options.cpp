@@ -70,8 +70,12 @@ InertialFusionOptions fusion_options(const FusionArguments& arguments, const std
   options.start.magnetic_declination = arguments.declination_deg * kDegree;
   if (arguments.gps_sigma_option->count() > 0) options.gps_sigma = arguments.gps_sigma;
   if (!arguments.origin.empty()) options.origin = parse_origin(arguments.origin);
-  if (rig.gps) options.gps_antenna = rig.gps->antenna_in_body;
-  if (rig.imu && preset == "robust") options.filter.noise = rig.imu->noise;
+  if (rig.gps) {
+    options.gps_antenna = rig.gps->antenna_in_body;
+    if (std::isfinite(rig.gps->time_offset_sigma_s)) options.gps_time_sigma = rig.gps->time_offset_sigma_s;
+  }
+  // Guesses in the rig are no better than the preset's.
+  if (rig.imu && !rig.imu->noise_measured.empty() && preset == "robust") options.filter.noise = rig.imu->noise;
   options.check();
   return options;
 }

@@ -28,7 +28,8 @@ struct FusionArguments {
 void add_fusion_options(CLI::App& app, FusionArguments& arguments);
 
 /// @param preset as InertialFusionOptions::preset
-/// @param rig gives the lever arm of the antenna and, for the preset robust, the noise of the IMU
+/// @param rig gives the lever arm of the antenna, the deviation of the time offset of GPS where it was measured and,
+/// for the preset robust, the noise of the IMU where it was measured
 /// @throws UsageError, std::invalid_argument naming the option.
 InertialFusionOptions fusion_options(const FusionArguments& arguments, const std::string& preset, const Rig& rig);
 
