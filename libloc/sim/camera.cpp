@@ -81,9 +81,8 @@ void CameraSimulator::update_tracks() {
     const bool seen = in_view_[i].point >= 0;
     if (track.status == Status::kTracked && (!seen || tracking_.uniform() < model_.loss_rate)) {
       track.status = Status::kLost;
-    } else if (track.status == Status::kLost && seen && tracking_.uniform() < model_.reappear_rate) {
-      candidates.push_back(i);
-    } else if (track.status == Status::kNew && seen) {
+    } else if (seen && (track.status == Status::kNew ||
+                        (track.status == Status::kLost && tracking_.uniform() < model_.reappear_rate))) {
       candidates.push_back(i);
     }
     if (track.status == Status::kTracked) taken_.push_back(in_view_[i].pixel_px);

@@ -1,5 +1,6 @@
 #include "libloc/sim/scene.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -73,16 +74,15 @@ bool SightLines::reach(const ScenePoint& point) const {
     const Face& own = scene_.faces[static_cast<std::size_t>(point.face)];
     if ((eye_ - own.origin).dot(own.normal()) <= 0) return false;
   }
-  for (const Front& front : fronts_) {
+  return std::ranges::none_of(fronts_, [&](const Front& front) {
     const Eigen::Vector3d from = point.position - front.origin;
     const double height = from.dot(front.normal);
-    if (height > -kOnFace || front.face == point.face) continue;
+    if (height > -kOnFace || front.face == point.face) return false;
     const double share = front.eye.z() / (front.eye.z() - height);  // of the way at which the face is met
     const double x = front.eye.x() + share * (from.dot(front.right) - front.eye.x());
     const double y = front.eye.y() + share * (from.dot(front.up) - front.eye.y());
-    if (x >= 0 && y >= 0 && x <= front.size.x() && y <= front.size.y()) return false;
-  }
-  return true;
+    return x >= 0 && y >= 0 && x <= front.size.x() && y <= front.size.y();
+  });
 }
 
 void Scene::check() const {
