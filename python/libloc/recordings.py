@@ -68,7 +68,8 @@ def open_recording(path: str | PathLike[str]) -> MeasurementSource:
 
 
 def read_recording(path: str | PathLike[str]) -> Recording:
-    """The whole recording as arrays: .imu, .magnetometer, .reference, .gps, .odometry, .features, .counts.
+    """The whole recording as arrays: .imu, .magnetometer, .reference, .gps, .odometry, .features; and .counts
+    of what was skipped.
 
     r = libloc.read_recording("01_trial.mat")
     result = libloc.MadgwickFilter().run(r.imu.times_ns, r.imu.angular_velocity, r.imu.specific_force,
