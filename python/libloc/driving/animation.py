@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from libloc._core import so3
+from libloc._core import Pose3, so3
 from libloc.driving.painter import Camera, Canvas, Rgb, mixed
 from libloc.driving.run import DrivingRun, Floats, interpolated_rotation
 from libloc.driving.scene import Building, DrivingScene
@@ -62,18 +62,7 @@ def box_corners(position: Floats, q_wxyz: Floats) -> Floats:
     low, high = VEHICLE_LOW, VEHICLE_HIGH
     floor = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
     corners = np.array([(x, y, z) for z in (low[2], high[2]) for x, y in floor])
-    return position + corners @ rotation_matrix(q_wxyz).T
-
-
-def rotation_matrix(q_wxyz: Floats) -> Floats:
-    w, x, y, z = q_wxyz
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return Pose3(q_wxyz, position).transform(corners)
 
 
 def _at(t_s: float, times_s: Floats, rows: Floats) -> Floats:
