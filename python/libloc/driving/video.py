@@ -86,7 +86,7 @@ def _checked(frames: Iterable[Frame]) -> Iterator[Frame]:
         if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8:
             raise ValueError(f"frame {i}: is {frame.dtype} {frame.shape}, must be uint8 (height, width, 3)")
         if shape is not None and frame.shape != shape:
-            raise ValueError(f"frame {i}: has shape {frame.shape}, the first one has {shape}")
+            raise ValueError(f"frame {i}: has shape {frame.shape}, the first has {shape}")
         shape = frame.shape
         yield frame
     if shape is None:
