@@ -65,6 +65,7 @@ using Key = std::tuple<TimeNs, int, std::int64_t>;
 struct Waiting {
   Measurement measurement;
   std::optional<SimulationTruth> truth;
+  std::optional<FrameTruth> frame;
 };
 
 }  // namespace
@@ -95,6 +96,9 @@ struct Simulation::Implementation {
   std::int64_t number = 0;
   TimeNs simulated_ns = 0;
   SimulationTruth truth;
+  Scene world;
+  std::optional<FrameTruth> measured_frame;  // of the features that are being put
+  FrameTruth frame;
 };
 
 Simulation::Implementation::Implementation(const Scenario& given, std::uint64_t seed, const SimulationOptions& opts)
@@ -137,7 +141,7 @@ Simulation::Implementation::Implementation(const Scenario& given, std::uint64_t 
         [this](const StreamTick& t) { return gps->measure(state_at(t.time_ns)); });
   }
   if (on.features && !scenario.cameras.empty()) {
-    const Scene world = scenario.world();
+    world = scenario.world();
     cameras.reserve(scenario.cameras.size());
     for (std::size_t i = 0; i < scenario.cameras.size(); ++i) {
       const ScenarioCamera& camera = scenario.cameras[i];
@@ -148,7 +152,9 @@ Simulation::Implementation::Implementation(const Scenario& given, std::uint64_t 
       const double early_s = std::max(0.0, camera.calibration.time_offset_s) + kNever * model.stamp_jitter_s;
       add("features" + std::to_string(i), camera.clock, model.rate_hz, camera_clock, from_seconds(early_s),
           [this, i](const StreamTick& t) {
-            FeaturesMeasurement m = cameras[i].observe(state_at(t.time_ns)).measurement;
+            SimulatedFrame seen = cameras[i].observe(state_at(t.time_ns));
+            measured_frame = FrameTruth{seen.time_s, seen.T_world_camera, std::move(seen.truth)};
+            FeaturesMeasurement m = std::move(seen.measurement);
             m.host_time_ns = t.time_ns + from_seconds(scenario.cameras[i].latency_s);
             return Measurement(std::move(m));
           });
@@ -218,7 +224,8 @@ void Simulation::Implementation::put(Stream& stream, const StreamTick& tick, Mea
   }
   const TimeNs time = options.order == Order::kTime ? stamp.time_ns : stamp.host_time_ns;
   const int rank = rank_of(kind_of(measurement));
-  waiting.emplace(Key{time, rank, number++}, Waiting{std::move(measurement), std::move(known)});
+  waiting.emplace(Key{time, rank, number++},
+                  Waiting{std::move(measurement), std::move(known), std::exchange(measured_frame, std::nullopt)});
 }
 
 TimeNs Simulation::Implementation::earliest_key(const Stream& stream) const {
@@ -242,6 +249,7 @@ bool Simulation::Implementation::advance() {
     ++first->none;
   } else if (tick.lost) {
     ++first->lost;
+    measured_frame.reset();
   } else {
     ++first->made;
     put(*first, tick, std::move(*measurement));
@@ -273,11 +281,20 @@ std::optional<Measurement> Simulation::next() {
   Waiting out = std::move(i.waiting.begin()->second);
   i.waiting.erase(i.waiting.begin());
   if (out.truth) i.truth = *out.truth;
+  if (out.frame) i.frame = std::move(*out.frame);
   return std::move(out.measurement);
 }
 
 const SimulationTruth& Simulation::truth() const {
   return implementation_->truth;
+}
+
+const FrameTruth& Simulation::frame() const {
+  return implementation_->frame;
+}
+
+const Scene& Simulation::world() const {
+  return implementation_->world;
 }
 
 double Simulation::progress() const {

@@ -38,6 +38,13 @@ struct SimulationTruth {
   Eigen::Vector3d gps_error = Eigen::Vector3d::Constant(kUnknown);           ///< coloured part, east, north, up [m]
 };
 
+/// What was true of a frame of features.
+struct FrameTruth {
+  double time_s = kUnknown;                    ///< of the exposure, since the start of the motion
+  Pose3 T_world_camera;                        ///< at that time
+  std::vector<ObservationTruth> observations;  ///< of each feature, in the measurement's order
+};
+
 class Simulation {
  public:
   /// @throws std::invalid_argument as Scenario::check
@@ -50,6 +57,10 @@ class Simulation {
   std::optional<Measurement> next();
   /// Of the reference measurement that next() gave last.
   const SimulationTruth& truth() const;
+  /// Of the features that next() gave last.
+  const FrameTruth& frame() const;
+  /// What the cameras look at; without points when they are switched off.
+  const Scene& world() const;
   /// Share of the duration that has been simulated, in [0, 1].
   double progress() const;
   /// Of each stream what was made, lost on the way, or left out by the sensor (outage): {"imu.made", 6000},

@@ -471,6 +471,32 @@ TEST(Simulation, PullsOneByOneAndSaysHowFarItIs) {
   EXPECT_FALSE(simulation.next().has_value());
 }
 
+TEST(Simulation, FramesCarryTheirTruth) {
+  Scenario scenario = make_scenario("hand-held", 4);
+  scenario.cameras[0].calibration.time_offset_s = 0.03;
+  scenario.cameras[0].clock.loss_fraction = 0.2;
+  scenario.cameras[0].model.sigma_px = 0.7;
+  Simulation simulation(scenario, 1);
+  EXPECT_GT(simulation.world().points.size(), 100);
+  double square = 0;
+  std::size_t n = 0;
+  while (const auto m = simulation.next()) {
+    const auto* frame = std::get_if<FeaturesMeasurement>(&*m);
+    if (frame == nullptr) continue;
+    const FrameTruth& truth = simulation.frame();
+    // t_imu = t_camera + offset
+    EXPECT_NEAR(to_seconds(frame->time_ns - scenario.start_time_ns) + 0.03, truth.time_s, 1e-9);
+    const Pose3 pose = scenario.motion->at(truth.time_s).T_world_body * scenario.cameras[0].calibration.T_body_camera;
+    EXPECT_TRUE(near(truth.T_world_camera.matrix(), pose.matrix(), 1e-12));
+    ASSERT_EQ(truth.observations.size(), frame->features.size());
+    for (std::size_t i = 0; i < frame->features.size(); ++i) {
+      square += (frame->features[i].pixel_px - truth.observations[i].pixel_px).squaredNorm();
+      n += 2;
+    }
+  }
+  EXPECT_NEAR(std::sqrt(square / static_cast<double>(n)), 0.7, 0.03);
+}
+
 TEST(StreamClock, PerfectUnlessAskedOtherwise) {
   StreamClock clock({}, 25, Random(1));
   for (std::int64_t k = 0; k < 1000; ++k) {
