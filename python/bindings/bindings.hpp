@@ -18,6 +18,7 @@ void bind_eval(pybind11::module_& m);
 void bind_io(pybind11::module_& m);
 void bind_nmea(pybind11::module_& m);
 void bind_msgs(pybind11::module_& m);
+void bind_simulated_sensors(pybind11::module_& m);
 void bind_motion(pybind11::module_& m);
 
 }  // namespace locpy

@@ -8,6 +8,7 @@
 #include "libloc/sensors/imu_noise.hpp"
 #include "libloc/sensors/measurements.hpp"
 #include "libloc/sensors/rig.hpp"
+#include "properties.hpp"
 
 namespace locpy {
 namespace {
@@ -29,21 +30,6 @@ using loc::Rig;
 using loc::Stamp;
 using loc::TriadCalibration;
 using loc::TriadQuality;
-
-/// A property that is a vector (3,): Python gets a copy, because a view would let it write past the checks.
-template <class Class, class T>
-void vector_property(Class& c, const char* name, Eigen::Vector3d T::*member, const char* doc) {
-  c.def_property(
-      name, [member](const T& self) { return to_array(self.*member); },
-      [member, name](T& self, const ArrayLike& value) { self.*member = vector3(value, name); }, doc);
-}
-
-template <class Class, class T>
-void matrix_property(Class& c, const char* name, Eigen::Matrix3d T::*member, const char* doc) {
-  c.def_property(
-      name, [member](const T& self) { return to_matrix_array(self.*member); },
-      [member, name](T& self, const ArrayLike& value) { self.*member = matrix(value, name, 3, 3); }, doc);
-}
 
 template <class Class, class T>
 void vector4_property(Class& c, const char* name, Eigen::Vector4d T::*member, const char* doc) {
