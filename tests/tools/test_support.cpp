@@ -91,6 +91,17 @@ TEST(Pacer, WaitsByTheTimeStamps) {
   EXPECT_EQ(all_at_once.wait_ns(1'000'000 * kMs, 0), 0);
 }
 
+TEST(Pacer, ALateSampleDoesNotChangeThePace) {
+  // GPS fixes that arrive 200 ms after their time, between the samples of an IMU.
+  Pacer pacer(1);
+  pacer.wait_ns(0, 0);
+  EXPECT_EQ(pacer.wait_ns(1000 * kMs, 1000 * kMs), 0);
+  EXPECT_EQ(pacer.wait_ns(800 * kMs, 1000 * kMs), 0) << "at once";
+  EXPECT_EQ(pacer.wait_ns(1010 * kMs, 1000 * kMs), 10 * kMs);
+  EXPECT_EQ(pacer.restarts(), 0);
+  EXPECT_EQ(pacer.max_lag_ns(), 0);
+}
+
 TEST(Pacer, TakesUpThePaceAfterAStepOfTheClock) {
   Pacer pacer(1);
   pacer.wait_ns(500'000 * kMs, 0);

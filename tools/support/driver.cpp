@@ -184,7 +184,9 @@ bool Driver::send(const std::string& channel, const Message& message) {
 void Driver::publish_measurement(Measurement& measurement) {
   const StreamKind kind = kind_of(measurement);
   Stamp& stamp = stamp_of(measurement);
-  stamp.sequence = next_sequence_[{kind, camera_of(measurement)}]++;
+  std::int64_t& next = next_sequence_[{kind, camera_of(measurement)}];
+  if (options_.keep_sequence && stamp.sequence >= 0) next = stamp.sequence;
+  stamp.sequence = next++;
   if (!options_.live) stamp.host_time_ns = host_now();
   const std::string& channel = options_.channels[static_cast<std::size_t>(kind)];
   if (!std::visit([&](const auto& m) { return send(channel, to_message(m)); }, measurement)) return;

@@ -30,6 +30,7 @@ struct DriverOptions {
   double reconnect_timeout_s = 10;                 ///< longest time without a hub
   std::optional<double> wait_for_estimator_s;      ///< before the first sample
   bool live = false;  ///< a sensor: not paced, host_time_ns is the source's, what cannot be sent is lost and counted
+  bool keep_sequence = false;  ///< sequence numbers are the source's, losses in them stay
   bool statistics = false;
 
   /// @throws std::invalid_argument naming the field and its value.

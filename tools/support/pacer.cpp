@@ -5,13 +5,6 @@
 #include "libloc/core/check.hpp"
 
 namespace loc {
-namespace {
-
-// Streams are in order by and large only: an image may be a little older than the IMU sample before it.
-constexpr TimeNs kTolerance = 100'000'000;
-
-}  // namespace
-
 Pacer::Pacer(double speed) : speed_(speed) {
   require_not_negative("speed", speed);
 }
@@ -19,14 +12,16 @@ Pacer::Pacer(double speed) : speed_(speed) {
 TimeNs Pacer::wait_ns(TimeNs sample_time_ns, TimeNs now_ns) {
   if (speed_ == 0) return 0;
   TimeNs step = 0;
-  const bool overflow = __builtin_sub_overflow(sample_time_ns, last_sample_ns_, &step);
-  if (!started_ || overflow || step < -kTolerance || step > kMaxStepNs) {
+  const bool overflow = __builtin_sub_overflow(sample_time_ns, newest_sample_ns_, &step);
+  if (!started_ || overflow || step < -kMaxLateNs || step > kMaxStepNs) {
     if (started_) ++restarts_;
     started_ = true;
     origin_sample_ns_ = sample_time_ns;
     origin_now_ns_ = now_ns;
+  } else if (step < 0) {
+    return 0;
   }
-  last_sample_ns_ = sample_time_ns;
+  newest_sample_ns_ = sample_time_ns;
   const TimeNs elapsed = sample_time_ns - origin_sample_ns_;
   const TimeNs due = origin_now_ns_ + from_seconds(to_seconds(elapsed) / speed_);
   max_lag_ns_ = std::max(max_lag_ns_, now_ns - due);
