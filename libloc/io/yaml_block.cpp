@@ -73,6 +73,37 @@ std::vector<std::string> YamlBlock::keys() const {
   return keys;
 }
 
+void YamlBlock::add_text(const YAML::Node& node, const std::string& name, std::string& text) const {
+  if (node.IsSequence()) {
+    for (const YAML::Node& item : node) add_text(item, name, text);
+  } else if (node.IsScalar()) {
+    text += (text.empty() ? "" : ", ") + node.Scalar();
+  } else {
+    throw DataError(where(node) + ": key '" + full(name) + "' must be a value or a list of values");
+  }
+}
+
+void YamlBlock::add_leaves(const YAML::Node& node, const std::string& name, std::vector<Leaf>& leaves) const {
+  if (!node.IsMap()) {
+    std::string text;
+    add_text(node, name, text);
+    leaves.push_back({name, text, where(node)});
+    return;
+  }
+  for (const auto& entry : node) {
+    if (!entry.first.IsScalar()) throw DataError(where(entry.first) + ": a key must be a word");
+    const std::string& key = entry.first.Scalar();
+    add_leaves(entry.second, name.empty() ? key : name + "." + key, leaves);
+  }
+}
+
+std::vector<YamlBlock::Leaf> YamlBlock::leaves() {
+  std::vector<Leaf> leaves;
+  add_leaves(node_, "", leaves);
+  for (const std::string& key : keys()) asked_.insert(key);
+  return leaves;
+}
+
 bool YamlBlock::has(const char* key) const {
   return node_[key].IsDefined();
 }

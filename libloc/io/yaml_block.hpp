@@ -50,6 +50,15 @@ class YamlBlock {
   /// A list of mappings.
   std::vector<YamlBlock> blocks(const char* key);
 
+  /// What all of the block's values are, as text: names of nested keys are joined by points, the values of (nested)
+  /// lists by commas. All keys count as asked for. @throws DataError for mappings inside lists.
+  struct Leaf {
+    std::string name;
+    std::string text;
+    std::string where;  ///< "file:line"
+  };
+  std::vector<Leaf> leaves();
+
   /// Passes over a key that may be there and is of no interest.
   void ignore(const char* key) { asked_.insert(key); }
   /// @throws DataError for a key that was not asked for.
@@ -59,6 +68,8 @@ class YamlBlock {
  private:
   YamlBlock(std::string file, std::string name, const YAML::Node& node);
   YAML::Node get(const char* key);
+  void add_leaves(const YAML::Node& node, const std::string& name, std::vector<Leaf>& leaves) const;
+  void add_text(const YAML::Node& node, const std::string& name, std::string& text) const;
   std::string where(const YAML::Node& node) const;
   std::string full(const std::string& key) const { return name_.empty() ? key : name_ + "." + key; }
   double number_of(const YAML::Node& node, const std::string& name) const;
