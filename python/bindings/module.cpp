@@ -19,7 +19,7 @@ PYBIND11_MODULE(_core, m) {
   locpy::bind_io(m);
   locpy::bind_nmea(m);
   locpy::bind_msgs(m);
-  locpy::bind_simulated_sensors(m);
   locpy::bind_motion(m);
   locpy::bind_camera(m);
+  locpy::bind_simulated_sensors(m);
 }
