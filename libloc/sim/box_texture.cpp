@@ -48,7 +48,7 @@ class Painter {
     std::vector<std::uint8_t> out(whole_.size() * channels);
     std::size_t next = 0;
     for (std::size_t i = 0; i < whole_.size(); ++i) {
-      std::array<float, 3> colour = colours_[static_cast<std::size_t>(whole_[i] + 1)];
+      std::array<float, 3> colour = colour_of(whole_[i]);
       const std::size_t first = next;
       while (next < parts_.size() && parts_[next].texel == i) ++next;
       if (next > first) colour = mixed(i, std::span(parts_).subspan(first, next - first));
@@ -61,6 +61,11 @@ class Painter {
  private:
   static std::size_t count(int width, int height) {
     return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  }
+
+  // @param patch -1: the background
+  const std::array<float, 3>& colour_of(std::int32_t patch) const {
+    return colours_[static_cast<std::size_t>(std::int64_t{patch} + 1)];
   }
 
   void lay(std::int32_t patch) {
@@ -82,8 +87,9 @@ class Painter {
 
   // The texel is cut along every edge in it; each piece has the colour of the last patch over it.
   std::array<float, 3> mixed(std::size_t texel, std::span<const Partial> parts) const {
-    const auto x = static_cast<double>(texel % static_cast<std::size_t>(width_));
-    const auto y = static_cast<double>(texel / static_cast<std::size_t>(width_));
+    const std::size_t row = texel / static_cast<std::size_t>(width_);
+    const auto x = static_cast<double>(texel - row * static_cast<std::size_t>(width_));
+    const auto y = static_cast<double>(row);
     std::vector<double> xs{x, x + 1};
     std::vector<double> ys{y, y + 1};
     for (const Partial& part : parts) {
@@ -105,7 +111,7 @@ class Painter {
           const bool over = (middle.array() > low_[p].array()).all() && (middle.array() < high_[p].array()).all();
           if (over) top = std::max(top, part.patch);
         }
-        const std::array<float, 3>& colour = colours_[static_cast<std::size_t>(top + 1)];
+        const std::array<float, 3>& colour = colour_of(top);
         for (std::size_t c = 0; c < 3; ++c) sum.at(c) += static_cast<float>(area) * colour.at(c);
       }
     }

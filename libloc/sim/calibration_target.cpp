@@ -89,7 +89,7 @@ Scene april_grid(const AprilGridModel& model) {
       }
       for (const Eigen::Vector2d& k :
            {Eigen::Vector2d(0, 0), Eigen::Vector2d(a, 0), Eigen::Vector2d(a, a), Eigen::Vector2d(0, a)}) {
-        texture.features.push_back(low + k);
+        texture.features.emplace_back(low + k);
       }
     }
   }
