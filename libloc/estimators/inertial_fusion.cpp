@@ -57,6 +57,7 @@ InertialFusionOptions InertialFusionOptions::robust() {
   options.gps_sigma_floor = 1;
   options.gps_velocity_sigma_floor = 0.1;
   options.gps_time_sigma = 0.05;
+  options.gps_correlation_time_s = 20;
   return options;
 }
 
@@ -91,6 +92,7 @@ void InertialFusionOptions::check() const {
   require_positive("gps_velocity_sigma", gps_velocity_sigma);
   require_not_negative("gps_sigma_floor", gps_sigma_floor);
   require_not_negative("gps_velocity_sigma_floor", gps_velocity_sigma_floor);
+  require_not_negative("gps_correlation_time_s", gps_correlation_time_s);
   require_not_negative("gps_time_sigma", gps_time_sigma);
   require_positive("gps_max_ahead_s", gps_max_ahead_s);
   require_positive("odometry_position_sigma", odometry_position_sigma);

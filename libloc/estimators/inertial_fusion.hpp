@@ -75,7 +75,10 @@ struct InertialFusionOptions {
   double gps_sigma_floor = 0;           ///< horizontal, vertical by gps_vertical_factor [m]
   double gps_velocity_sigma_floor = 0;  ///< [m/s]
   double gps_time_sigma = 0;            ///< [s]
-  double gps_max_ahead_s = 1;           ///< A fix that is further ahead of the IMU belongs to another clock. [s]
+  /// How long the error of a position lasts, with a fix below RTK. Fixes dt apart count as white ones of (1 + phi)/(1 -
+  /// phi) times the variance, phi = exp(-dt/this): as little as they tell together. 0: white. [s]
+  double gps_correlation_time_s = 0;
+  double gps_max_ahead_s = 1;  ///< A fix that is further ahead of the IMU belongs to another clock. [s]
 
   bool use_odometry = true;
   OdometryUse odometry = OdometryUse::kAutomatic;
@@ -195,6 +198,7 @@ class InertialFusion {
   Eigen::Vector3d odometry_origin_ = Eigen::Vector3d::Zero();  // where our origin is in the odometry's world
   bool odometry_left_world_ = false;                           // it was rejected as an absolute one
   TimeNs rest_fused_ns_ = kNoTime;
+  TimeNs gps_before_ns_ = kNoTime;  // of the fix before this one
 
   Stamp last_;
   std::uint32_t status_ = 0;

@@ -88,6 +88,14 @@ bool InertialFusion::prepare(const GpsMeasurement& gps, Eigen::Vector3d& positio
   }
   position_cov = (turn * position_cov * turn.transpose()).eval();
   raise(position_cov, gps.fix < GpsFixType::kFloat ? options_.gps_sigma_floor : 0, options_.gps_vertical_factor);
+  // While the heading is looked for, and for the fix that the state begins with, one error is as good as another.
+  if (options_.gps_correlation_time_s > 0 && gps.fix < GpsFixType::kFloat && heading_known_ &&
+      gps_before_ns_ != kNoTime) {
+    const double apart = std::abs(to_seconds(gps.time_ns - gps_before_ns_));
+    const double phi = std::exp(-apart / options_.gps_correlation_time_s);
+    if (phi < 1) position_cov *= (1 + phi) / (1 - phi);
+  }
+  gps_before_ns_ = gps.time_ns;
   const Eigen::Vector3d way = options_.gps_time_sigma * filter().state().inertial.velocity;
   if (heading_known_) {
     position_cov += way * way.transpose();

@@ -10,4 +10,4 @@ from libloc.recordings import file_format as file_format
 from libloc.recordings import open_recording as open_recording
 from libloc.recordings import read_recording as read_recording
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"

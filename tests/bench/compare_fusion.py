@@ -29,11 +29,12 @@ import numpy as np
 import libloc
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-ORIGIN = (0.8556, 0.1467, 115.0)  # [rad, rad, m] anywhere: fixes of recordings that have local metres
+ORIGIN = (0.8556, 0.1467, 115.0)  # [rad, rad, m] anywhere: for fixes in local metres, which pass for RTK
 RIG = """format: libloc-rig-1
 {imu}gps:
   antenna_in_body: [0, 0, 0]
   time_offset_s: {gps_offset_s}
+  time_offset_sigma_s: {gps_offset_sigma_s}
 ...
 """
 RIG_IMU = """imu:
@@ -70,10 +71,11 @@ def write_csv(path: Path, imu: np.ndarray, fixes: np.ndarray, sigma: float) -> N
         "time_ns [ns]",
         *("gx [rad/s]", "gy [rad/s]", "gz [rad/s]", "ax [m/s^2]", "ay [m/s^2]", "az [m/s^2]"),
         *("latitude [rad]", "longitude [rad]", "altitude [m]"),
-        *("sigma_e [m]", "sigma_n [m]", "sigma_u [m]"),
+        *("sigma_e [m]", "sigma_n [m]", "sigma_u [m]", "fix"),
     ]
     rows: list[tuple[int, list[str]]] = [
-        (int(r[0]), [str(int(r[0])), *(repr(float(x)) for x in r[1:]), "", "", "", "", "", ""]) for r in imu
+        (int(r[0]), [str(int(r[0])), *(repr(float(x)) for x in r[1:]), "", "", "", "", "", "", ""])
+        for r in imu
     ]
     for fix in fixes:
         place = world.to_geodetic(np.ascontiguousarray(fix[None, 1:], dtype=float))[0]
@@ -105,7 +107,7 @@ def kitti(folder: Path, out: Path) -> Case:
     fixes = fixes[(fixes[:, 0] > times[0]) & (fixes[:, 0] < times[-1])]
     used, held = fixes[::2], fixes[1::2]
     write_csv(out / "kitti.csv", table, used, 0.1)
-    rig = RIG.format(imu=RIG_IMU.format(3e-3, 1e-5, 0.1, 1e-3), gps_offset_s=0)
+    rig = RIG.format(imu=RIG_IMU.format(3e-3, 1e-5, 0.1, 1e-3), gps_offset_s=0, gps_offset_sigma_s=0.001)
     return Case("kitti", out / "kitti.csv", rig, held[:, 0].astype(np.int64), held[:, 1:])
 
 
@@ -129,14 +131,16 @@ def euroc(folder: Path, out: Path) -> Case:
         np.column_stack([truth_ns[::20], fixes]),
         0.05,
     )
-    rig = RIG.format(imu=RIG_IMU.format(1.7e-4, 2e-5, 2e-3, 3e-3), gps_offset_s=0)  # EuRoC's sensor.yaml
+    rig = RIG.format(
+        imu=RIG_IMU.format(1.7e-4, 2e-5, 2e-3, 3e-3), gps_offset_s=0, gps_offset_sigma_s=0.001
+    )  # EuRoC's sensor.yaml
     return Case("euroc", out / "euroc.csv", rig, truth_ns, truth[:, 1:4], skip_s=10)
 
 
 def pntos(log: Path) -> Case:
     reference = libloc.read_recording(str(log)).reference
     every = slice(None, None, 20)
-    rig = RIG.format(imu="", gps_offset_s=-0.201)
+    rig = RIG.format(imu="", gps_offset_s=-0.201, gps_offset_sigma_s=0.02)
     return Case(
         "pntos", log, rig, reference.times_ns[every], reference.position[every], skip_s=200, free_offset=True
     )
