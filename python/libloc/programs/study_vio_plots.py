@@ -59,7 +59,7 @@ def plot_errors(study: Study, rows: list[RowSummary], path: Path) -> None:
     figure.savefig(path, dpi=110)
 
 
-def plot_consistency(c: ConsistencySummary, path: Path) -> None:
+def plot_consistency(c: ConsistencySummary, label: str, path: Path) -> None:
     """NEES of the whole state and of its blocks, and NIS, averaged over the runs, with their bounds."""
     figure = _figure(11, 11)
     panels = figure.subplots(5, 2, sharex=True).ravel()
@@ -88,7 +88,7 @@ def plot_consistency(c: ConsistencySummary, path: Path) -> None:
         axes.tick_params(labelbottom=True)
     for axes in panels[-4:]:
         axes.set_xlabel("time [s]")
-    figure.suptitle(f"19 states, interval-mean IMU, averages over {runs} runs; grey: 95 % bounds at one time")
+    figure.suptitle(f"{label}\n19 states, averages over {runs} runs; grey: 95 % bounds at one time")
     figure.savefig(path, dpi=110)
 
 
@@ -103,7 +103,8 @@ def draw(study: Study, folder: Path) -> list[Path]:
     if rows:
         files.append(folder / "vio_errors.png")
         plot_errors(study, rows, files[-1])
-    if study.consistency is not None:
-        files.append(folder / "vio_consistency.png")
-        plot_consistency(study.consistency, files[-1])
+    labels = {one.row.name: one.row.label for one in study.rows}
+    for name, consistency in study.consistency.items():
+        files.append(folder / f"vio_{name}.png")
+        plot_consistency(consistency, labels[name], files[-1])
     return files

@@ -25,6 +25,7 @@ BLOCKS = (
     ("drift", 16, 3),
 )
 STATES = 19
+_SCALE = 15
 # Errors over time are kept at every so many IMU samples: a multiple of the four between two frames.
 EVERY = 20
 
@@ -109,6 +110,8 @@ def key_frames(odometry: Any, interval_ns: int, sensors: libloc.FusionPresetSens
 
 @dataclass
 class Start:
+    """State that a filter starts with."""
+
     q_wxyz: Floats
     position: Floats
     velocity: Floats
@@ -141,7 +144,7 @@ def run_filter(
 ) -> tuple[Any, libloc.ErrorStateFilter]:
     """The run of a row's filter over the recording, and the filter at its end."""
     assert row.preset is not None
-    sensors = libloc.FusionPresetSensors()
+    sensors = libloc.FusionPresetSensors(**dict(row.sensors))
     preset = libloc.FusionPreset.by_name(row.preset, sensors)
     options = preset.options
     options.gate = row.gate
@@ -149,13 +152,15 @@ def run_filter(
     if dict(row.parameters).get("imu.sampling") == "interval-mean":
         options.sampling = libloc.ImuSampling.INTERVAL_MEAN
     start_cov = preset.start_cov
+    if row.scale_sigma is not None:
+        start_cov[_SCALE, _SCALE] = row.scale_sigma**2
+    imu = recording.imu
+    first_ns, step_ns = int(imu.times_ns[0]), int(imu.times_ns[1] - imu.times_ns[0])
+    start = start_of(row, truth, start_cov, seed)
     if row.odometry == "key frames":
         options.clones = 1
         # Rows of clones are there, but not used.
         start_cov = np.pad(start_cov, (0, 6))
-    imu = recording.imu
-    first_ns, step_ns = int(imu.times_ns[0]), int(imu.times_ns[1] - imu.times_ns[0])
-    start = start_of(row, truth, preset.start_cov, seed)
     estimator = libloc.ErrorStateFilter(options)
     estimator.start(
         # The published order predicts at the first sample too.
@@ -201,7 +206,7 @@ def run_filter(
         imu.times_ns,
         imu.angular_velocity,
         imu.specific_force,
-        with_covariance=row.start_drawn,
+        with_covariance=row.table == "consistency",
         **streams,
     )
     return result, estimator
@@ -270,7 +275,7 @@ def run(task: Task) -> dict[str, Outcome]:
             (truth.times_ns[kept] - truth.times_ns[0]) * 1e-9,
             np.linalg.norm(errors[kept], axis=1),
         )
-        if row.start_drawn:
+        if row.table == "consistency":
             out[row.name].nees = _nees(result, truth, kept)
             out[row.name].nis = result.odometry_nis[np.isfinite(result.odometry_nis)]
     return out
