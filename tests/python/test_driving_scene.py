@@ -13,6 +13,7 @@ from libloc.driving.video import write_video
 from libloc.lcm_log import LogWriter
 from libloc.programs import animate
 from PIL import Image
+from support import built_program
 
 import libloc
 from libloc import driving
@@ -421,3 +422,29 @@ def test_program(run, tmp_path, capsys):
     assert "cut.csv:601: " in refused(tmp_path / "run.log", "--truth", tmp_path / "cut.csv")
     (tmp_path / "other.csv").write_text("time_ns,x\n1,2\n")
     assert "no column q_world_body_w" in refused(tmp_path / "run.log", "--truth", tmp_path / "other.csv")
+
+
+def test_simulator_estimator_and_picture_end_to_end(tmp_path):
+    simulate, estimator = built_program("loc-simulate"), built_program("loc-estimator")
+    log, out = tmp_path / "run.log", tmp_path / "est.lcm"
+
+    def run_program(*command) -> None:
+        done = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+
+    run_program(simulate, "--scenario", "vio-example", "--seed", 1, "--duration", "12s", "--out", log)
+    run_program(
+        *(estimator, "--method", "error-state", "--preset", "19", "--start", "reference"),
+        *("--input", log, "--output", out),
+    )
+    drive, _ = driving.run_of_log(out, log, truth_csv=tmp_path / "run.log.truth.csv")
+    assert drive.times_s[-1] > 11.9 and len(drive.times_s) > 1190
+    assert drive.position_rmse < 4
+    assert drive.odometry_in_metres[2] == "true scale" and drive.odometry_rmse < 2
+    assert abs(drive.scale_error) < 0.1
+    # The errors are what the filter says: nearly all within three deviations.
+    inside = np.abs(drive.position_error) < 3 * drive.estimated("position_sigma")
+    assert inside.mean() > 0.95
+    arguments = [str(out), "--reference", str(log), "--output", str(tmp_path), "--video", "none"]
+    assert animate.main(arguments) == 0
+    assert (tmp_path / "summary.png").stat().st_size > 50_000
