@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from libloc._core import so3
 from libloc.driving.animation import ESTIMATE, ODOMETRY, TRUTH, VEHICLE_HIGH, VEHICLE_LOW
 from libloc.driving.run import DrivingRun, Floats
 from libloc.driving.scene import DrivingScene
@@ -80,10 +81,25 @@ def view_rerun(path: str | os.PathLike[str]) -> subprocess.Popen[bytes]:
 
 def _blueprint(rr: Any, run: DrivingRun) -> Any:
     rrb = rr.blueprint
-    plots = [
-        rrb.TimeSeriesView(origin=f"errors/{name}", name=title) for name, title, _, _ in _error_rows(run)
-    ]
-    scene = rrb.Spatial3DView(origin="world", name="drive")
+    plots = []
+    for name, title, values, sigma in _error_rows(run):
+        # As in the summary: the range is that of what came after the start.
+        later = run.times_s >= 0.1 * run.times_s[-1]
+        middle = values[-1] if name == "scale" else np.zeros(values.shape[1])
+        reach = np.abs(values[later] - middle) if sigma is None else 3 * sigma[later]
+        limit = 1.5 * max(float(np.nanmax(reach, initial=0.0)), 1e-9)
+        axis = rrb.ScalarAxis(range=(float(middle[0]) - limit, float(middle[0]) + limit))
+        legend = rrb.PlotLegend(visible=False)
+        plots.append(rrb.TimeSeriesView(origin=f"errors/{name}", name=title, axis_y=axis, plot_legend=legend))
+    # Behind and above the true vehicle, and with it.
+    heading = float(np.atleast_1d(so3.heading(run.true_q_world_body_wxyz[:1]))[0])
+    behind = np.array([-45 * np.cos(heading), -45 * np.sin(heading), 30.0])
+    eye = rrb.EyeControls3D(
+        position=run.true_position[0] + behind,
+        look_target=run.true_position[0],
+        tracking_entity="world/truth",
+    )
+    scene = rrb.Spatial3DView(origin="world", name="drive", eye_controls=eye)
     return rrb.Blueprint(
         rrb.Horizontal(scene, rrb.Vertical(*plots), column_shares=[2, 1]), collapse_panels=True
     )
@@ -149,10 +165,15 @@ def _error_rows(run: DrivingRun) -> list[tuple[str, str, Floats, Floats | None]]
     """Name, title, errors (N, 3), deviations (N, 3)"""
     sigma = run.estimated("attitude_sigma")
     rows = [
-        ("position", "position error, ±3σ [m]", run.position_error, run.estimated("position_sigma")),
+        (
+            "position",
+            "position error x y z, ±3σ [m]",
+            run.position_error,
+            run.estimated("position_sigma"),
+        ),
         (
             "attitude",
-            "attitude error, ±3σ [°]",
+            "attitude error x y z, ±3σ [°]",
             np.rad2deg(run.attitude_error),
             None if sigma is None else np.rad2deg(sigma),
         ),
