@@ -218,6 +218,25 @@ def test_the_estimated_vehicle_is_transparent_and_apart(run, scene):
     assert 0.2 < 1 - np.linalg.norm(with_box - BLUE) / np.linalg.norm(without - BLUE) < 0.8
 
 
+def test_the_horizon_is_level():
+    # An empty plain, looked at in all directions: sky above the horizon, ground below.
+    whole = make_run(60.0, rate_hz=5)
+    empty = driving.DrivingScene(driving.scene_along(whole.truth.position).road, 8.0, ())
+    low = driving.DrivingAnimation(whole, empty, replace(SMALL, behind_m=60.0, above_m=12.0))
+    high = driving.DrivingAnimation(whole, empty, SMALL)
+    for t in (3.0, 23.5, 29.0, 55.2, 57.6):
+        picture, camera = low.frame(t).astype(int), low.camera(t)
+        ahead = camera.axes[2] * [1, 1, 0] / np.hypot(*camera.axes[2, :2])
+        row = round(float(camera.project(camera.eye + 1e6 * ahead)[1]))
+        assert 5 < row < 60
+        # The panels cover the outer columns.
+        assert np.all(picture[row - 2, 95:236, 2] > picture[row - 2, 95:236, 0] + 5)
+        assert np.all(picture[row + 4, 95:236, 1] > picture[row + 4, 95:236, 2])
+        # From higher up it lies above the picture.
+        top = high.frame(t)[1, 95:236].astype(int)
+        assert np.all(top[:, 1] > top[:, 2])
+
+
 def test_summary_shows_all_rows(run, tmp_path):
     figure = driving.plot_summary(run, "title")
     assert [a.get_ylabel().split("\n")[0] for a in figure.axes] == [

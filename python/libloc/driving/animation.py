@@ -221,11 +221,15 @@ class DrivingAnimation:
 
     def _draw_ground(self, canvas: Canvas, height: float) -> None:
         eye = canvas.camera.eye
-        far = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * 3000.0
-        flat = np.array([eye[0], eye[1], height])
-        canvas.polygon(flat + far, mixed(_GROUND, _HAZE, 0.55))
-        canvas.polygon(flat + 0.12 * far, mixed(_GROUND, _HAZE, 0.25))
-        canvas.polygon(flat + 0.06 * far, _GROUND)
+        # The camera is level: all that is so far ahead lies in one row. Farther off it fades into the haze.
+        forward = canvas.camera.axes[2] * [1, 1, 0]
+        width, bottom = self.options.width, self.options.height + 2.0
+        for distance, part in ((20_000.0, 0.55), (360.0, 0.25), (180.0, 0.0)):
+            ahead = eye + distance * forward / np.linalg.norm(forward)
+            row = float(canvas.camera.project(np.array([ahead[0], ahead[1], height]))[1])
+            corners = np.array([[-2.0, row], [width + 2, row], [width + 2, bottom], [-2, bottom]])
+            if row < bottom:
+                canvas.flat_polygon(corners, mixed(_GROUND, _HAZE, part))
         # Pieces of 2 m, of 4 m where they are small.
         to = self.scene.road - eye
         distance = np.linalg.norm(to[:, :2], axis=1)
