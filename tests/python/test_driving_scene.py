@@ -464,6 +464,30 @@ def test_simulator_estimator_and_picture_end_to_end(tmp_path):
     # The errors are what the filter says: nearly all within three deviations.
     inside = np.abs(drive.position_error) < 3 * drive.estimated("position_sigma")
     assert inside.mean() > 0.95
+
+    # The same simulator and filter called from Python give the same drive.
+    simulated = libloc.simulate("vio-example", 1, duration_s=12.0)
+    imu, vo, truth = simulated.recording.imu, simulated.recording.odometry, simulated.truth
+    preset = libloc.FusionPreset.by_name("19")
+    fusion = libloc.ErrorStateFilter(preset.options)
+    start = truth.q_world_body_wxyz[0], truth.position[0], truth.velocity[0]
+    fusion.start(int(imu.times_ns[0]), preset.start_cov, *start)
+    result = fusion.run(
+        *(imu.times_ns, imu.angular_velocity, imu.specific_force),
+        odometry_times_ns=vo.times_ns,
+        odometry_position=vo.position,
+        odometry_position_cov=preset.odometry_position_cov,
+        odometry_wxyz=vo.q_wxyz,
+        odometry_orientation_cov=preset.odometry_orientation_cov,
+    )
+    same = driving.run_of_filter(imu.times_ns, result, truth, vo)
+    np.testing.assert_allclose(drive.position, same.position[-len(drive.position) :], atol=1e-9)
+    for name in ("position_sigma", "attitude_sigma", "scale", "scale_sigma", "gyroscope_bias"):
+        np.testing.assert_allclose(
+            drive.estimated(name)[-1], same.estimated(name)[-1], rtol=1e-9, err_msg=name
+        )
+    assert same.position_rmse == pytest.approx(drive.position_rmse)
+
     arguments = [str(out), "--reference", str(log), "--output", str(tmp_path), "--video", "none"]
     assert animate.main(arguments) == 0
     assert (tmp_path / "summary.png").stat().st_size > 50_000
