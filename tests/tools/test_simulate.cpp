@@ -207,7 +207,7 @@ TEST_F(Simulate, LiveWithItsLossesAndLatency) {
 }
 
 TEST_F(Simulate, VideoOrTheReasonWhyNot) {
-  const Arguments video = {"--scenario", "rest", "--duration", "1", "--video", path("v.avi"), "--rendered"};
+  const Arguments video = {"--scenario", "rest", "--duration", "0.3", "--video", path("v.avi"), "--rendered"};
   const int code = simulate(video);
   if (code == 2) {
     EXPECT_NE(errors().find("was built without it"), std::string::npos) << errors();
