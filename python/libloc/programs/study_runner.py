@@ -33,12 +33,18 @@ def cores() -> int:
 
 @contextlib.contextmanager
 def _without_interrupt() -> Iterator[None]:
-    """Processes started within ignore Ctrl-C, which the terminal sends to all: this one answers it."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Processes and threads started within do not get Ctrl-C, which the terminal sends to all of them.
+
+    This one answers it; when it comes within, after it.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextlib.contextmanager
@@ -68,7 +74,7 @@ def _client(jobs: int, scheduler: str | None) -> Iterator[Any]:
             n_workers=jobs,
             threads_per_worker=1,
             processes=True,
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",  # any port that is free: a study may run beside another
             silence_logs=logging.CRITICAL,
             env=_ONE_THREAD,
         )

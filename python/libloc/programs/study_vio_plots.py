@@ -53,7 +53,9 @@ def plot_errors(study: Study, rows: list[RowSummary], path: Path) -> None:
         error = np.sqrt(np.mean([outcome.error_m**2 for outcome in runs], axis=0))
         known = error > 0  # a filter that starts at the truth; the axis is logarithmic
         axes.plot(runs[0].times_s[known], error[known], lw=1.2, label=one.row.label)
-    axes.set(yscale="log", xlabel="time [s]", ylabel="position error, RMS over the runs [m]")
+    axes.set(
+        yscale="log", ylim=(1e-2, None), xlabel="time [s]", ylabel="position error, RMS over the runs [m]"
+    )
     axes.grid(alpha=0.3)
     figure.legend(loc="outside right upper")
     figure.savefig(path, dpi=110)

@@ -133,8 +133,9 @@ def _consistency() -> list[Row]:
             gate=False,
             start_drawn=True,
         ),
-        # The scale is hardly observable in the first 20 s, a straight line at constant speed. There an extended
-        # Kalman filter linearises around one estimate after the other, and takes the difference for information.
+        # The scale is hardly observable in the first 20 s, a straight line at constant speed. There an
+        # extended Kalman filter linearises around one estimate after the other, and takes the difference for
+        # information.
         Row(
             "nees-scale",
             "start drawn from the filter's covariance, scale known to 0.5 %",
