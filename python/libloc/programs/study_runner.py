@@ -33,18 +33,12 @@ def cores() -> int:
 
 @contextlib.contextmanager
 def _without_interrupt() -> Iterator[None]:
-    """Processes and threads started within do not get Ctrl-C, which the terminal sends to all of them.
-
-    This one answers it; when it comes within, after it.
-    """
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    """Ctrl-C is ignored within, and by processes that are started within, which inherit that."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.signal(signal.SIGINT, before)
 
 
 @contextlib.contextmanager
@@ -78,8 +72,15 @@ def _client(jobs: int, scheduler: str | None) -> Iterator[Any]:
             silence_logs=logging.CRITICAL,
             env=_ONE_THREAD,
         )
-    with cluster, Client(cluster) as client:
+        client = Client(cluster)
+        # The terminal sends Ctrl-C to all processes: this one answers it, and stops the workers.
+        client.run(_ignore_interrupt)
+    with cluster, client:
         yield client
+
+
+def _ignore_interrupt() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _version() -> str:
