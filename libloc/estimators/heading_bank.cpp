@@ -13,6 +13,7 @@ namespace {
 
 // An outlier hits all of them; it must not decide by how much.
 constexpr double kMostNis = 100;
+constexpr double kRemembered = 0.8;  // of earlier NIS: the start may be off, the present must fit
 constexpr double kSigmaPerDistance = 0.6;
 constexpr double kNegligible = 1e-6;  // likelihood against the best one's
 // Filters closer than this have come to the same heading.
@@ -58,6 +59,7 @@ void HeadingBankOptions::check() const {
   require_positive("separation", separation);
   require_positive("max_heading_sigma", max_heading_sigma);
   require(min_measurements >= 1, "min_measurements", min_measurements, "must be positive");
+  require_positive("max_mean_nis", max_mean_nis);
 }
 
 double heading_variance(const ErrorStateState& state, const Eigen::Ref<const Eigen::MatrixXd>& covariance) {
@@ -85,14 +87,17 @@ HeadingBank::HeadingBank(const HeadingBankOptions& options, const ErrorStateOpti
   options_.check();
   filters_.emplace_back(filter);
   scores_.assign(1, 0);
+  nis_.assign(1, 0);
 }
 
 void HeadingBank::start(TimeNs time_ns, const ErrorStateState& state, const Eigen::MatrixXd& covariance) {
   std::swap(filters_.front(), filters_[best_]);
   filters_.erase(filters_.begin() + 1, filters_.end());
   scores_.assign(1, 0);
+  nis_.assign(1, 0);
   best_ = 0;
   scored_ = 0;
+  dof_ = 0;
   filters_.front().start(time_ns, state, covariance);
 }
 
@@ -113,13 +118,18 @@ void HeadingBank::start_all_headings(TimeNs time_ns, const ErrorStateState& stat
     filters_.back().start(time_ns, turned, cov);
   }
   scores_.assign(filters_.size(), 0);
+  nis_.assign(filters_.size(), 0);
 }
 
 void HeadingBank::score(std::size_t i, const FusionResult& result) {
   const bool judged = result.outcome == FusionOutcome::kAccepted || result.outcome == FusionOutcome::kGated;
   if (!judged || result.source != FusionSource::kGps) return;
   scores_[i] += std::min(result.nis, kMostNis) + log_determinant(result);
-  if (i == 0) ++scored_;
+  nis_[i] = kRemembered * nis_[i] + std::min(result.nis, kMostNis);
+  if (i == 0) {
+    ++scored_;
+    dof_ = kRemembered * dof_ + result.dof;
+  }
 }
 
 void HeadingBank::find_best() {
@@ -159,6 +169,7 @@ bool HeadingBank::decide() {
       options_.max_heading_sigma * options_.max_heading_sigma) {
     return false;
   }
+  if (nis_[best_] > options_.max_mean_nis * dof_) return false;
   const double heading = so3::heading(best.state().inertial.q_world_body);
   for (std::size_t i = 0; i < filters_.size(); ++i) {
     const double other = so3::heading(filters_[i].state().inertial.q_world_body);

@@ -21,6 +21,9 @@ struct HeadingBankOptions {
   double separation = 25;          ///< score by which every other heading must be worse than the best
   double max_heading_sigma = 0.2;  ///< of the best, before the others go [rad]
   int min_measurements = 4;        ///< that were scored
+  /// Mean NIS of the best over the last few, per number measured: with more none of them is right (a bias beyond its
+  /// deviation, a wrong start), and the best of bad ones is not chosen.
+  double max_mean_nis = 3;
 
   /// @throws std::invalid_argument naming the field and its value.
   void check() const;
@@ -64,8 +67,10 @@ class HeadingBank {
   HeadingBankOptions options_;
   std::vector<ErrorStateFilter> filters_;
   std::vector<double> scores_;
+  std::vector<double> nis_;  // weighted sums of the last few
   std::size_t best_ = 0;
   int scored_ = 0;
+  double dof_ = 0;  // numbers measured in them, weighted alike
 };
 
 /// Variance of the heading in the covariance of an error state [rad^2].

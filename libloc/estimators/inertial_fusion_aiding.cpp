@@ -12,6 +12,7 @@ namespace {
 
 constexpr int kToldAfter = 3;  // rejections in a row
 // So little is known of what is not measured that nothing follows from it, however often it is said. [m^2], [rad^2]
+constexpr int kFixesToDoubt = 3;  // rejections of GPS in a row
 constexpr double kNothing = 1e8;
 constexpr double kOldestAnchor = 1;     // [s]
 constexpr double kScaleDoubt = 0.3;     // of the scale, when the odometry is not believed any more
@@ -95,7 +96,6 @@ bool InertialFusion::prepare(const GpsMeasurement& gps, Eigen::Vector3d& positio
     const double phi = std::exp(-apart / options_.gps_correlation_time_s);
     if (phi < 1) position_cov *= (1 + phi) / (1 - phi);
   }
-  gps_before_ns_ = gps.time_ns;
   const Eigen::Vector3d way = options_.gps_time_sigma * filter().state().inertial.velocity;
   if (heading_known_) {
     position_cov += way * way.transpose();
@@ -138,6 +138,7 @@ void InertialFusion::fuse(const GpsMeasurement& gps) {
     const ErrorStateState state = filter().state();
     bank_.start_all_headings(filter().time_ns(), state, Eigen::MatrixXd(filter().covariance()));
   }
+  gps_before_ns_ = std::max(gps_before_ns_, gps.time_ns);
   take_note(bank_.fuse([&](ErrorStateFilter& one) {
     return one.fuse_gps(gps.time_ns, position, position_cov, options_.gps_antenna, velocity, velocity_cov);
   }));
@@ -321,8 +322,9 @@ void InertialFusion::take_note(const FusionResult& result) {
   watch.accepted = 0;
   if (watch.rejected++ == 0) watch.since_ns = result.time_ns;
   if (watch.rejected >= kToldAfter) next_status_ |= gps ? kGpsRejected : kOdometryRejected;
-  if (watch.rejected >= options_.reject_count &&
-      to_seconds(result.time_ns - watch.since_ns) >= options_.reject_time_s) {
+  // Fixes are seldom: waiting for many of them would leave the filter lost for long.
+  const int enough = gps ? std::min(options_.reject_count, kFixesToDoubt) : options_.reject_count;
+  if (watch.rejected >= enough && to_seconds(result.time_ns - watch.since_ns) >= options_.reject_time_s) {
     recover(result, watch);
   }
 }

@@ -44,8 +44,10 @@ RIG_IMU = """imu:
     gyroscope_random_walk: {1}
     accelerometer_noise_density: {2}
     accelerometer_random_walk: {3}
-    gyroscope_bias_sigma: 1.0e-2
+    gyroscope_bias_sigma: {4}
     accelerometer_bias_sigma: 0.2
+    measured: [gyroscope_noise_density, gyroscope_random_walk, accelerometer_noise_density,
+               accelerometer_random_walk, gyroscope_bias_sigma]
   gyroscope: {{bias: [0, 0, 0], matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}
   accelerometer: {{bias: [0, 0, 0], matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}
 """
@@ -68,7 +70,7 @@ def write_csv(path: Path, imu: np.ndarray, fixes: np.ndarray, sigma: float) -> N
     """imu: rows of time_ns, gyro, force; fixes: rows of time_ns, local metres."""
     world = libloc.LocalFrame(*ORIGIN)
     names = [
-        "time_ns [ns]",
+        "time_ns",
         *("gx [rad/s]", "gy [rad/s]", "gz [rad/s]", "ax [m/s^2]", "ay [m/s^2]", "az [m/s^2]"),
         *("latitude [rad]", "longitude [rad]", "altitude [m]"),
         *("sigma_e [m]", "sigma_n [m]", "sigma_u [m]", "fix"),
@@ -89,6 +91,7 @@ def write_csv(path: Path, imu: np.ndarray, fixes: np.ndarray, sigma: float) -> N
             "",
             *(repr(float(x)) for x in place),
             *[repr(sigma)] * 3,
+            "6",
         ]
         rows.append((int(fix[0]), cells))
     rows.sort(key=lambda row: row[0])
@@ -106,8 +109,10 @@ def kitti(folder: Path, out: Path) -> Case:
     fixes = np.column_stack([np.round(gps[:, 0] * 1e9), gps[:, 1:]])
     fixes = fixes[(fixes[:, 0] > times[0]) & (fixes[:, 0] < times[-1])]
     used, held = fixes[::2], fixes[1::2]
-    write_csv(out / "kitti.csv", table, used, 0.1)
-    rig = RIG.format(imu=RIG_IMU.format(3e-3, 1e-5, 0.1, 1e-3), gps_offset_s=0, gps_offset_sigma_s=0.001)
+    write_csv(out / "kitti.csv", table, used, 0.5)
+    rig = RIG.format(
+        imu=RIG_IMU.format(3e-3, 1e-5, 0.1, 1e-3, 0.01), gps_offset_s=0, gps_offset_sigma_s=0.001
+    )
     return Case("kitti", out / "kitti.csv", rig, held[:, 0].astype(np.int64), held[:, 1:])
 
 
@@ -132,7 +137,7 @@ def euroc(folder: Path, out: Path) -> Case:
         0.05,
     )
     rig = RIG.format(
-        imu=RIG_IMU.format(1.7e-4, 2e-5, 2e-3, 3e-3), gps_offset_s=0, gps_offset_sigma_s=0.001
+        imu=RIG_IMU.format(1.7e-4, 2e-5, 2e-3, 3e-3, 0.1), gps_offset_s=0, gps_offset_sigma_s=0.001
     )  # EuRoC's sensor.yaml
     return Case("euroc", out / "euroc.csv", rig, truth_ns, truth[:, 1:4], skip_s=10)
 

@@ -18,11 +18,18 @@ using test::DrivenCircle;
 
 constexpr double kRate = 100;
 
+// The preset for real sensors, with GPS errors as they are simulated here.
+InertialFusionOptions white_fixes() {
+  InertialFusionOptions options = InertialFusionOptions::robust();
+  options.gps_correlation_time_s = 0;
+  return options;
+}
+
 // A drive through the estimator: IMU at 100 Hz, GPS at 1 Hz (velocity if gps_velocity_sigma is positive), odometry at
 // 10 Hz with a world of its own. Hooks change what is sent; an empty optional is left out.
 struct Drive {
   DrivenCircle motion;
-  InertialFusionOptions options = InertialFusionOptions::robust();
+  InertialFusionOptions options = white_fixes();
   double duration_s = 60;
   double gps_sigma = 1.5;
   double gps_velocity_sigma = 0;
