@@ -9,7 +9,7 @@ import numpy.typing
 import os
 import typing
 from . import so3
-__all__: list[str] = ['AbsoluteError', 'AccelerometerFit', 'AccelerometerOptions', 'Alignment', 'AllanFit', 'AllanOptions', 'AllanTerm', 'Association', 'CameraCalibration', 'ClockCalibration', 'ClockCalibrationResult', 'ClockChain', 'ClockLine', 'ClockModel', 'Consistency', 'CounterUnwrapper', 'DataError', 'DiscreteImuNoise', 'DistortionModel', 'ESTIMATE_CHANNEL', 'EllipsoidAdvice', 'EllipsoidCollector', 'EllipsoidFit', 'EllipsoidOptions', 'ErrorStatistics', 'Estimate', 'EstimateStatus', 'EstimateValid', 'GPS_CHANNEL', 'GpsArrays', 'GpsCalibration', 'GpsClock', 'GpsFixType', 'GpsMeasurement', 'GyroscopeFit', 'GyroscopeOptions', 'IMAGE_CHANNEL', 'IMU_CHANNEL', 'ImageMeasurement', 'ImuAllan', 'ImuArrays', 'ImuCalibration', 'ImuMeasurement', 'ImuNoise', 'ImuNoiseFit', 'LcmLogReader', 'MAGNETOMETER_CHANNEL', 'MadgwickFilter', 'MadgwickOptions', 'MadgwickResult', 'MagnetometerAlignment', 'MagnetometerAlignmentOptions', 'MagnetometerArrays', 'MagnetometerCalibration', 'MagnetometerMeasurement', 'MeasurementSource', 'NO_TIME', 'NmeaFixes', 'OrientationError', 'Pose3', 'Quality', 'REFERENCE_CHANNEL', 'Random', 'Recording', 'ReferenceArrays', 'ReferenceMeasurement', 'RelativeError', 'RestNoise', 'Rig', 'SOURCE_STATUS_CHANNEL', 'STATISTICS_CHANNEL', 'StillSegment', 'Stillness', 'StillnessDetector', 'StillnessOptions', 'TimeOffsetResult', 'Trajectory', 'TriadCalibration', 'TriadQuality', 'Verdict', 'absolute_error', 'align_magnetometer', 'align_points', 'aligned', 'allan_fit', 'analyse_imu_noise', 'associate', 'average_consistency', 'beta_from_gyro', 'calibrate_clock', 'chi_square_cdf', 'chi_square_quantile', 'discretise', 'error_statistics', 'estimate_time_offset', 'find_stillness', 'fit_accelerometer', 'fit_accelerometer_poses', 'fit_ellipsoid', 'fit_gyroscope', 'fit_gyroscope_bias', 'format_seconds', 'gps_from_unix', 'imu_noise_from', 'leap_seconds_known_until', 'local_positions', 'message_fingerprints', 'message_type', 'normalised_error_squared', 'open_broad', 'open_csv', 'open_euroc', 'open_lcm_log', 'open_nmea', 'orientation_error', 'parse_nmea', 'parse_seconds', 'quantile', 'read_any_rig', 'read_rig', 'read_tum', 'relative_error', 'root_mean_square', 'simulate_clock', 'simulate_gps_time', 'so3', 'unix_from_gps', 'update_rig', 'write_rig', 'write_tum']
+__all__: list[str] = ['AbsoluteError', 'AccelerometerFit', 'AccelerometerOptions', 'Alignment', 'AllanFit', 'AllanOptions', 'AllanTerm', 'Association', 'Camera', 'CameraCalibration', 'CameraModel', 'CameraRun', 'CarMotion', 'CircleMotion', 'ClockCalibration', 'ClockCalibrationResult', 'ClockChain', 'ClockLine', 'ClockModel', 'Consistency', 'CounterUnwrapper', 'DataError', 'DiscreteImuNoise', 'DistortionModel', 'ESTIMATE_CHANNEL', 'EllipsoidAdvice', 'EllipsoidCollector', 'EllipsoidFit', 'EllipsoidOptions', 'ErrorStateFilter', 'ErrorStateOptions', 'ErrorStateRun', 'ErrorStatistics', 'Estimate', 'EstimateStatus', 'EstimateValid', 'FUSION_CHANNEL', 'FeaturesArrays', 'FeaturesMeasurement', 'FigureEightMotion', 'FusionOutcome', 'FusionPreset', 'FusionPresetSensors', 'FusionResult', 'GPS_CHANNEL', 'GpsArrays', 'GpsCalibration', 'GpsClock', 'GpsFixType', 'GpsMeasurement', 'GpsModel', 'GyroscopeFit', 'GyroscopeOptions', 'HandHeldMotion', 'IMAGE_CHANNEL', 'IMU_CHANNEL', 'ImageMeasurement', 'ImuAllan', 'ImuArrays', 'ImuCalibration', 'ImuIntegration', 'ImuMeasurement', 'ImuModel', 'ImuNoise', 'ImuNoiseFit', 'ImuSampleModel', 'ImuSampling', 'InertialTriadModel', 'LcmLogReader', 'LocalFrame', 'LookAtMotion', 'MAGNETOMETER_CHANNEL', 'MadgwickFilter', 'MadgwickOptions', 'MadgwickResult', 'MagnetometerAlignment', 'MagnetometerAlignmentOptions', 'MagnetometerArrays', 'MagnetometerCalibration', 'MagnetometerMeasurement', 'MagnetometerModel', 'MeasurementSource', 'Motion', 'MotionArrays', 'MountedMotion', 'NO_TIME', 'NmeaFixes', 'ODOMETRY_CHANNEL', 'OdometryArrays', 'OdometryMeasurement', 'OrientationError', 'PedestrianMotion', 'Pose3', 'PredictOutcome', 'Quality', 'REFERENCE_CHANNEL', 'Random', 'Recording', 'ReferenceArrays', 'ReferenceMeasurement', 'RelativeError', 'RestFirstMotion', 'RestMotion', 'RestNoise', 'Rig', 'SOURCE_STATUS_CHANNEL', 'STATISTICS_CHANNEL', 'Scenario', 'ScenarioStreams', 'Scene', 'SceneRenderer', 'SimulatedRun', 'Simulation', 'StillSegment', 'Stillness', 'StillnessDetector', 'StillnessOptions', 'StreamClockModel', 'StreetModel', 'TRACKS_CHANNEL', 'TimeOffsetResult', 'Trajectory', 'TriadCalibration', 'TriadQuality', 'TruthArrays', 'Verdict', 'VisualOdometryModel', 'WaypointMotion', 'absolute_error', 'align_magnetometer', 'align_points', 'aligned', 'allan_fit', 'analyse_imu_noise', 'april_grid', 'associate', 'average_consistency', 'beta_from_gyro', 'box_room', 'calibrate_clock', 'checkerboard', 'chi_square_cdf', 'chi_square_quantile', 'discretise', 'error_statistics', 'estimate_time_offset', 'example_drive', 'find_stillness', 'fit_accelerometer', 'fit_accelerometer_poses', 'fit_ellipsoid', 'fit_gyroscope', 'fit_gyroscope_bias', 'format_seconds', 'gps_from_unix', 'imu_noise_from', 'leap_seconds_known_until', 'local_positions', 'message_fingerprints', 'message_type', 'normalised_error_squared', 'open_broad', 'open_csv', 'open_euroc', 'open_lcm_log', 'open_nmea', 'orientation_error', 'parse_nmea', 'parse_seconds', 'quantile', 'read_any_rig', 'read_points', 'read_rig', 'read_tracks', 'read_tum', 'relative_error', 'root_mean_square', 'sampled_path', 'scenario_names', 'simulate', 'simulate_camera', 'simulate_clock', 'simulate_gps_time', 'so3', 'street', 'unix_from_gps', 'update_rig', 'write_points', 'write_rig', 'write_tracks', 'write_tum']
 class DataError(ValueError):
     """
     What is wrong in a file or message: where (file, line or byte), which field, which value.
@@ -110,6 +110,24 @@ class Pose3:
     @translation.setter
     def translation(self, arg1: numpy.typing.ArrayLike) -> None:
         ...
+class LocalFrame:
+    """
+    East, north, up of an origin on WGS 84 [m]: a plane that touches the ellipsoid, valid at any distance.
+    """
+    def __init__(self, latitude: typing.SupportsFloat | typing.SupportsIndex, longitude: typing.SupportsFloat | typing.SupportsIndex, altitude: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        [rad], [rad], [m] above the ellipsoid.
+        """
+    def __repr__(self) -> str:
+        ...
+    def to_geodetic(self, position: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) or (N, 3), east, north, up [m] to latitude, longitude [rad] and altitude [m].
+        """
+    def to_local(self, latitude_longitude_altitude: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) or (N, 3) [rad, rad, m] to east, north, up [m].
+        """
 class ImuNoise:
     """
     Noise of an IMU as continuous densities.
@@ -430,6 +448,120 @@ class GpsMeasurement:
         """
         (3,) [m/s]
         """
+class OdometryMeasurement:
+    """
+    Pose by an odometry that knows no metre, in its own unit: length = scale * metres. What is not known is NaN.
+    """
+    def __init__(self, time_ns: typing.SupportsInt | typing.SupportsIndex, position: numpy.typing.ArrayLike, q_wxyz: numpy.typing.ArrayLike, *, start_time_ns: typing.SupportsInt | typing.SupportsIndex | None = None, position_cov: numpy.typing.ArrayLike | None = None, orientation_cov: numpy.typing.ArrayLike | None = None) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def host_time_ns(self) -> int | None:
+        """
+        Arrival at the host [ns]; None when unknown.
+        """
+    @host_time_ns.setter
+    def host_time_ns(self, arg1: typing.SupportsInt | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def orientation_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 3) [rad^2], axes of body at time_ns
+        """
+    @orientation_cov.setter
+    def orientation_cov(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [odometry's unit]
+        """
+    @position.setter
+    def position(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def position_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 3) [unit^2], axes of position
+        """
+    @position_cov.setter
+    def position_cov(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def q_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def sequence(self) -> int:
+        """
+        Counts the samples of one stream from 0; -1 when unknown.
+        """
+    @sequence.setter
+    def sequence(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def start_time_ns(self) -> int | None:
+        """
+        None: absolute, pose of body in world. Otherwise pose of body in the axes of body at this time.
+        """
+    @property
+    def time_ns(self) -> int:
+        """
+        Time of measurement [ns].
+        """
+    @time_ns.setter
+    def time_ns(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class FeaturesMeasurement:
+    """
+    The features of one frame with their identities.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def camera(self) -> int:
+        """
+        index of the camera in the rig
+        """
+    @property
+    def host_time_ns(self) -> int | None:
+        """
+        Arrival at the host [ns]; None when unknown.
+        """
+    @host_time_ns.setter
+    def host_time_ns(self, arg1: typing.SupportsInt | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def id(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (M,) int64, the same for the same point of the scene
+        """
+    @property
+    def pixel_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, 2), u and v in the distorted image
+        """
+    @property
+    def sequence(self) -> int:
+        """
+        Counts the samples of one stream from 0; -1 when unknown.
+        """
+    @sequence.setter
+    def sequence(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_px(self) -> float:
+        """
+        deviation of one coordinate; NaN when unknown
+        """
+    @property
+    def time_ns(self) -> int:
+        """
+        Time of measurement [ns].
+        """
+    @time_ns.setter
+    def time_ns(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
 class ImageMeasurement:
     """
     One picture, raw or JPEG.
@@ -827,7 +959,7 @@ class Rig:
     magnetometer: MagnetometerCalibration | None
     def __init__(self) -> None:
         ...
-    def calibrated(self, measurement: ImuMeasurement | MagnetometerMeasurement | ImageMeasurement | GpsMeasurement | ReferenceMeasurement) -> ImuMeasurement | MagnetometerMeasurement | ImageMeasurement | GpsMeasurement | ReferenceMeasurement:
+    def calibrated(self, measurement: ImuMeasurement | MagnetometerMeasurement | ImageMeasurement | GpsMeasurement | ReferenceMeasurement | OdometryMeasurement | FeaturesMeasurement) -> ImuMeasurement | MagnetometerMeasurement | ImageMeasurement | GpsMeasurement | ReferenceMeasurement | OdometryMeasurement | FeaturesMeasurement:
         """
         The measurement as the calibration corrects it.
         """
@@ -1142,6 +1274,7 @@ class EstimateValid(enum.IntFlag):
     HEADING: typing.ClassVar[EstimateValid]
     ORIENTATION: typing.ClassVar[EstimateValid]
     POSITION: typing.ClassVar[EstimateValid]
+    SCALE: typing.ClassVar[EstimateValid]
     VELOCITY: typing.ClassVar[EstimateValid]
     @classmethod
     def __new__(cls, value):
@@ -1168,15 +1301,21 @@ class EstimateStatus(enum.IntFlag):
     """
     ACCELEROMETER_IGNORED: typing.ClassVar[EstimateStatus]
     AT_REST: typing.ClassVar[EstimateStatus]
+    BAD_COVARIANCE: typing.ClassVar[EstimateStatus]
+    BRIDGED: typing.ClassVar[EstimateStatus]
     GAP: typing.ClassVar[EstimateStatus]
+    GPS_REJECTED: typing.ClassVar[EstimateStatus]
     INITIALISING: typing.ClassVar[EstimateStatus]
     MAGNETOMETER_DISTURBED: typing.ClassVar[EstimateStatus]
     MAGNETOMETER_IGNORED: typing.ClassVar[EstimateStatus]
     MAGNETOMETER_MISSING: typing.ClassVar[EstimateStatus]
     NOT_FINITE: typing.ClassVar[EstimateStatus]
+    ODOMETRY_REJECTED: typing.ClassVar[EstimateStatus]
     OUT_OF_RANGE: typing.ClassVar[EstimateStatus]
+    RECOVERED: typing.ClassVar[EstimateStatus]
     REINITIALISED: typing.ClassVar[EstimateStatus]
     TIME_NOT_INCREASING: typing.ClassVar[EstimateStatus]
+    TOO_LATE: typing.ClassVar[EstimateStatus]
     @classmethod
     def __new__(cls, value):
         ...
@@ -1221,6 +1360,11 @@ class Estimate:
         (3,) [rad/s]
         """
     @property
+    def origin(self) -> tuple[float, float, float] | None:
+        """
+        Latitude, longitude [rad] and altitude [m] of world's origin; None when nothing ties it to the Earth.
+        """
+    @property
     def position(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (3,) [m]
@@ -1228,6 +1372,16 @@ class Estimate:
     @property
     def q_world_body_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
+    @property
+    def scale(self) -> float:
+        """
+        of the odometry: its unit per metre; NaN when it is not estimated
+        """
+    @property
+    def scale_sigma(self) -> float:
+        """
+        its deviation
+        """
     @property
     def sequence(self) -> int:
         ...
@@ -1324,6 +1478,493 @@ class MadgwickFilter:
         """
         of the last IMU step
         """
+class ImuIntegration(enum.IntEnum):
+    """
+    How a step is integrated: with the attitude in its middle, or at its start.
+    """
+    EULER: typing.ClassVar[ImuIntegration]
+    MIDPOINT: typing.ClassVar[ImuIntegration]
+    @classmethod
+    def __new__(cls, value):
+        ...
+    def __format__(self, format_spec):
+        ...
+class ImuSampling(enum.IntEnum):
+    """
+    What an IMU sample says: the value at its time, or the mean since the last one.
+    """
+    INTERVAL_MEAN: typing.ClassVar[ImuSampling]
+    POINT: typing.ClassVar[ImuSampling]
+    @classmethod
+    def __new__(cls, value):
+        ...
+    def __format__(self, format_spec):
+        ...
+class ErrorStateOptions:
+    """
+    Options of ErrorStateFilter; every field is a keyword: ErrorStateOptions(clones=1, gate=False).
+    """
+    integration: ImuIntegration
+    reset_jacobian: bool
+    sampling: ImuSampling
+    def __init__(self, **kwargs) -> None:
+        """
+        TypeError for an unknown field, ValueError for a value out of range.
+        """
+    def check(self) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    @property
+    def bridge_angular_velocity_sigma(self) -> float:
+        """
+        [rad/s]
+        """
+    @bridge_angular_velocity_sigma.setter
+    def bridge_angular_velocity_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def bridge_specific_force_sigma(self) -> float:
+        """
+        [m/s^2]
+        """
+    @bridge_specific_force_sigma.setter
+    def bridge_specific_force_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def clones(self) -> int:
+        """
+        Past poses that are kept, for relative odometry.
+        """
+    @clones.setter
+    def clones(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def drift_sigma(self) -> float:
+        """
+        Steady state, one component [odometry's unit].
+        """
+    @drift_sigma.setter
+    def drift_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def drift_time_constant_s(self) -> float:
+        ...
+    @drift_time_constant_s.setter
+    def drift_time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def estimate_drift(self) -> bool:
+        """
+        Gauss-Markov drift of absolute odometry.
+        """
+    @estimate_drift.setter
+    def estimate_drift(self, arg0: bool) -> None:
+        ...
+    @property
+    def estimate_extrinsics(self) -> bool:
+        """
+        Where the odometry's sensor sits.
+        """
+    @estimate_extrinsics.setter
+    def estimate_extrinsics(self, arg0: bool) -> None:
+        ...
+    @property
+    def estimate_scale(self) -> bool:
+        """
+        Odometry's unit per metre.
+        """
+    @estimate_scale.setter
+    def estimate_scale(self, arg0: bool) -> None:
+        ...
+    @property
+    def gate(self) -> bool:
+        """
+        Chi-square gate before every update.
+        """
+    @gate.setter
+    def gate(self, arg0: bool) -> None:
+        ...
+    @property
+    def gate_probability(self) -> float:
+        """
+        Share of good measurements that pass it.
+        """
+    @gate_probability.setter
+    def gate_probability(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gravity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) in world [m/s^2]
+        """
+    @gravity.setter
+    def gravity(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def history_ns(self) -> int:
+        """
+        How late a measurement may come.
+        """
+    @history_ns.setter
+    def history_ns(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_bridge_ns(self) -> int:
+        """
+        Still longer ones are refused.
+        """
+    @max_bridge_ns.setter
+    def max_bridge_ns(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_step_ns(self) -> int:
+        """
+        Longer steps between IMU samples are bridged and counted.
+        """
+    @max_step_ns.setter
+    def max_step_ns(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def noise(self) -> ImuNoise:
+        """
+        ImuNoise; its turn-on sigmas are not used here.
+        """
+    @noise.setter
+    def noise(self, arg0: ImuNoise) -> None:
+        ...
+    @property
+    def scale_random_walk(self) -> float:
+        """
+        Relative [1/sqrt(s)].
+        """
+    @scale_random_walk.setter
+    def scale_random_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class FusionPresetSensors:
+    """
+    Sensors of the visual-inertial example, for FusionPreset; every field is a keyword.
+    """
+    def __init__(self, **kwargs) -> None:
+        ...
+    def check(self) -> None:
+        ...
+    @property
+    def accelerometer_noise_density(self) -> float:
+        """
+        One-sided [m/s^2/sqrt(Hz)].
+        """
+    @accelerometer_noise_density.setter
+    def accelerometer_noise_density(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accelerometer_resolution(self) -> float:
+        """
+        [m/s^2]
+        """
+    @accelerometer_resolution.setter
+    def accelerometer_resolution(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyroscope_noise_density(self) -> float:
+        """
+        One-sided [rad/s/sqrt(Hz)].
+        """
+    @gyroscope_noise_density.setter
+    def gyroscope_noise_density(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyroscope_resolution(self) -> float:
+        """
+        [rad/s]
+        """
+    @gyroscope_resolution.setter
+    def gyroscope_resolution(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def imu_rate_hz(self) -> float:
+        ...
+    @imu_rate_hz.setter
+    def imu_rate_hz(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def odometry_drift_sigma(self) -> float:
+        """
+        [odometry's unit]
+        """
+    @odometry_drift_sigma.setter
+    def odometry_drift_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def odometry_drift_tau(self) -> float:
+        """
+        Frames.
+        """
+    @odometry_drift_tau.setter
+    def odometry_drift_tau(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def odometry_orientation_sigma(self) -> float:
+        """
+        [rad]
+        """
+    @odometry_orientation_sigma.setter
+    def odometry_orientation_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def odometry_rate_hz(self) -> float:
+        ...
+    @odometry_rate_hz.setter
+    def odometry_rate_hz(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def odometry_white_sigma(self) -> float:
+        """
+        [odometry's unit]
+        """
+    @odometry_white_sigma.setter
+    def odometry_white_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class FusionPreset:
+    """
+    A ready configuration: options, start covariance (of a start at the truth) and noise of the odometry.
+    """
+    options: ErrorStateOptions
+    @staticmethod
+    def by_name(name: str, sensors: FusionPresetSensors = ...) -> FusionPreset:
+        """
+        "as_published", "16" or "19". ValueError for another name.
+        """
+    @property
+    def odometry_orientation_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def odometry_position_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def start_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+class PredictOutcome(enum.IntEnum):
+    """
+    What became of an IMU sample.
+    """
+    BRIDGED: typing.ClassVar[PredictOutcome]
+    FIRST: typing.ClassVar[PredictOutcome]
+    GAP: typing.ClassVar[PredictOutcome]
+    NOT_FINITE: typing.ClassVar[PredictOutcome]
+    NOT_STARTED: typing.ClassVar[PredictOutcome]
+    PREDICTED: typing.ClassVar[PredictOutcome]
+    TIME_NOT_INCREASING: typing.ClassVar[PredictOutcome]
+    @classmethod
+    def __new__(cls, value):
+        ...
+    def __format__(self, format_spec):
+        ...
+class FusionOutcome(enum.IntEnum):
+    """
+    What became of a measurement.
+    """
+    ACCEPTED: typing.ClassVar[FusionOutcome]
+    BAD_COVARIANCE: typing.ClassVar[FusionOutcome]
+    GATED: typing.ClassVar[FusionOutcome]
+    NOT_FINITE: typing.ClassVar[FusionOutcome]
+    NOT_STARTED: typing.ClassVar[FusionOutcome]
+    NO_CLONE: typing.ClassVar[FusionOutcome]
+    TOO_LATE: typing.ClassVar[FusionOutcome]
+    WAITING: typing.ClassVar[FusionOutcome]
+    @classmethod
+    def __new__(cls, value):
+        ...
+    def __format__(self, format_spec):
+        ...
+class FusionResult:
+    """
+    What became of a measurement, and why.
+    """
+    @property
+    def accepted(self) -> bool:
+        ...
+    @property
+    def dof(self) -> int:
+        ...
+    @property
+    def innovation_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def nis(self) -> float:
+        ...
+    @property
+    def outcome(self) -> FusionOutcome:
+        ...
+    @property
+    def residual(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def source(self) -> str:
+        ...
+    @property
+    def time_ns(self) -> int | None:
+        ...
+class ErrorStateRun:
+    """
+    What ErrorStateFilter.run gives; row i is the state after IMU sample i.
+    """
+    @property
+    def accelerometer_bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [m/s^2]
+        """
+    @property
+    def covariance(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        (N, n, n) when asked for, otherwise None.
+        """
+    @property
+    def drift(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3)
+        """
+    @property
+    def gps_nis(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def gps_outcome(self) -> numpy.typing.NDArray[numpy.uint8]:
+        ...
+    @property
+    def gyroscope_bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [rad/s]
+        """
+    @property
+    def odometry_nis(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        One for each row of odometry; NaN where it was not applied.
+        """
+    @property
+    def odometry_outcome(self) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        FusionOutcome; WAITING: newer than the last IMU sample.
+        """
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [m]
+        """
+    @property
+    def predict_outcome(self) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        (N,) PredictOutcome
+        """
+    @property
+    def q_world_body_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 4)
+        """
+    @property
+    def scale(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N,)
+        """
+    @property
+    def variances(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, n), diagonal of the covariance: theta p v bg ba s c …
+        """
+    @property
+    def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [m/s]
+        """
+class ErrorStateFilter:
+    """
+    Attitude, position, velocity and biases from an IMU, corrected by odometry without scale, GPS, velocity, height, heading, rest. Error state theta p v bg ba | scale | drift | extrinsics | clones, theta on the right. Late measurements are put where they belong.
+    """
+    def __init__(self, options: ErrorStateOptions | None = None) -> None:
+        ...
+    def counts(self) -> dict[str, int]:
+        """
+        {name: number}
+        """
+    def fuse_gps(self, time_ns: typing.SupportsInt | typing.SupportsIndex, position: numpy.typing.ArrayLike, position_cov: numpy.typing.ArrayLike, antenna: numpy.typing.ArrayLike = [0.0, 0.0, 0.0], velocity: numpy.typing.ArrayLike | None = None, velocity_cov: numpy.typing.ArrayLike | None = None) -> FusionResult:
+        """
+        Position in world [m], velocity in world [m/s], antenna in body axes [m].
+        """
+    def fuse_heading(self, time_ns: typing.SupportsInt | typing.SupportsIndex, heading: typing.SupportsFloat | typing.SupportsIndex, sigma: typing.SupportsFloat | typing.SupportsIndex) -> FusionResult:
+        """
+        [rad]
+        """
+    def fuse_height(self, time_ns: typing.SupportsInt | typing.SupportsIndex, height: typing.SupportsFloat | typing.SupportsIndex, sigma: typing.SupportsFloat | typing.SupportsIndex) -> FusionResult:
+        """
+        [m]
+        """
+    def fuse_velocity(self, time_ns: typing.SupportsInt | typing.SupportsIndex, velocity: numpy.typing.ArrayLike, velocity_cov: numpy.typing.ArrayLike, in_body: bool = False) -> FusionResult:
+        ...
+    def fuse_vo(self, time_ns: typing.SupportsInt | typing.SupportsIndex, position: numpy.typing.ArrayLike, position_cov: numpy.typing.ArrayLike, q_world_odometry_wxyz: numpy.typing.ArrayLike, orientation_cov: numpy.typing.ArrayLike) -> FusionResult:
+        """
+        Absolute odometry, position in its own unit.
+        """
+    def fuse_vo_relative(self, time0_ns: typing.SupportsInt | typing.SupportsIndex, time1_ns: typing.SupportsInt | typing.SupportsIndex, position: numpy.typing.ArrayLike, position_cov: numpy.typing.ArrayLike, rotation_wxyz: numpy.typing.ArrayLike, orientation_cov: numpy.typing.ArrayLike) -> FusionResult:
+        """
+        Pose of the odometry's sensor at time1 in its axes at time0; needs options.clones.
+        """
+    def fuse_zero_velocity(self, time_ns: typing.SupportsInt | typing.SupportsIndex, velocity_sigma: typing.SupportsFloat | typing.SupportsIndex, angular_velocity: numpy.typing.ArrayLike | None = None, angular_velocity_sigma: typing.SupportsFloat | typing.SupportsIndex = ...) -> FusionResult:
+        """
+        At rest: velocity zero, and the gyroscope reads its bias.
+        """
+    def keep_pose(self, time_ns: typing.SupportsInt | typing.SupportsIndex) -> FusionResult:
+        ...
+    def predict(self, time_ns: typing.SupportsInt | typing.SupportsIndex, gyro: numpy.typing.ArrayLike, force: numpy.typing.ArrayLike) -> PredictOutcome:
+        """
+        The next IMU sample [rad/s], [m/s^2].
+        """
+    def run(self, times_ns: numpy.typing.NDArray[numpy.int64], gyro: numpy.typing.NDArray[numpy.float64], force: numpy.typing.NDArray[numpy.float64], *, odometry_times_ns: numpy.typing.NDArray[numpy.int64] | None = None, odometry_position: numpy.typing.NDArray[numpy.float64] | None = None, odometry_position_cov: numpy.typing.NDArray[numpy.float64] | None = None, odometry_wxyz: numpy.typing.NDArray[numpy.float64] | None = None, odometry_orientation_cov: numpy.typing.NDArray[numpy.float64] | None = None, odometry_arrivals_ns: numpy.typing.NDArray[numpy.int64] | None = None, odometry_start_times_ns: numpy.typing.NDArray[numpy.int64] | None = None, gps_times_ns: numpy.typing.NDArray[numpy.int64] | None = None, gps_position: numpy.typing.NDArray[numpy.float64] | None = None, gps_position_cov: numpy.typing.NDArray[numpy.float64] | None = None, gps_arrivals_ns: numpy.typing.NDArray[numpy.int64] | None = None, antenna: numpy.typing.ArrayLike = [0.0, 0.0, 0.0], with_covariance: bool = False) -> ErrorStateRun:
+        """
+        A whole recording in one call, without the GIL and without copies of the input.
+        
+        times_ns (N,) int64, gyro (N, 3) [rad/s], force (N, 3) [m/s^2]. Odometry: times (M,), position (M, 3), wxyz (M, 4), covariances (3, 3) or (M, 3, 3); with start times it is relative to the poses of then. GPS: position (K, 3) in world [m]. Arrivals say when a measurement comes (default: at once); they must not decrease.
+        """
+    def start(self, time_ns: typing.SupportsInt | typing.SupportsIndex, covariance: numpy.typing.ArrayLike, q_world_body_wxyz: numpy.typing.ArrayLike = [1.0, 0.0, 0.0, 0.0], position: numpy.typing.ArrayLike = [0.0, 0.0, 0.0], velocity: numpy.typing.ArrayLike = [0.0, 0.0, 0.0], gyroscope_bias: numpy.typing.ArrayLike = [0.0, 0.0, 0.0], accelerometer_bias: numpy.typing.ArrayLike = [0.0, 0.0, 0.0], scale: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        """
+        Starts, or starts anew. covariance (n, n) of the error state; ValueError unless symmetric and positive semidefinite.
+        """
+    @property
+    def T_body_odometry(self) -> Pose3:
+        ...
+    @property
+    def accelerometer_bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def covariance(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def drift(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def finished(self) -> list[FusionResult]:
+        """
+        What became of the measurements that waited for the last predict().
+        """
+    @property
+    def gyroscope_bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def q_world_body_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def scale(self) -> float:
+        ...
+    @property
+    def started(self) -> bool:
+        ...
+    @property
+    def time_ns(self) -> int | None:
+        ...
+    @property
+    def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
 class EllipsoidOptions:
     """
     How an ellipsoid is fitted, and where the verdicts change.
@@ -2914,14 +3555,92 @@ class GpsArrays:
         (N, 3) [rad, rad, m]
         """
     @property
+    def position_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3, 3) [m^2], east, north, up
+        """
+    @property
     def times_ns(self) -> numpy.typing.NDArray[numpy.int64]:
         """
         (N,) int64
         """
     @property
+    def velocity_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3, 3) [m^2/s^2]
+        """
+    @property
     def velocity_enu(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (N, 3) [m/s]
+        """
+class OdometryArrays:
+    """
+    Odometry, empty when there is none; lengths in its own unit.
+    """
+    @property
+    def orientation_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3, 3) [rad^2], axes of body
+        """
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [odometry's unit]
+        """
+    @property
+    def position_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3, 3) [unit^2]
+        """
+    @property
+    def q_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 4), takes body to world, or to body at the start
+        """
+    @property
+    def start_times_ns(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (N,) int64, from when a relative pose counts; the smallest int64 (NO_TIME): absolute
+        """
+    @property
+    def times_ns(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (N,) int64
+        """
+class FeaturesArrays:
+    """
+    Features of N frames, empty when there are none. Those of frame i are rows first[i]:first[i + 1] of id and pixel_px.
+    """
+    @property
+    def camera(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        (N,) int32, index of the camera in the rig
+        """
+    @property
+    def first(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (N + 1,) int64
+        """
+    @property
+    def id(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (M,) int64, the same for the same point of the scene
+        """
+    @property
+    def pixel_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, 2), u and v in the distorted image
+        """
+    @property
+    def sigma_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N,), deviation of one coordinate; NaN when unknown
+        """
+    @property
+    def times_ns(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (N,) int64
         """
 class Recording:
     """
@@ -2932,6 +3651,9 @@ class Recording:
         """
         What was read and what was skipped, and why.
         """
+    @property
+    def features(self) -> FeaturesArrays:
+        ...
     @property
     def gps(self) -> GpsArrays:
         ...
@@ -2947,6 +3669,9 @@ class Recording:
     def magnetometer(self) -> MagnetometerArrays:
         ...
     @property
+    def odometry(self) -> OdometryArrays:
+        ...
+    @property
     def reference(self) -> ReferenceArrays:
         ...
 class MeasurementSource:
@@ -2955,7 +3680,7 @@ class MeasurementSource:
     """
     def __iter__(self) -> typing.Any:
         ...
-    def __next__(self) -> ImuMeasurement | MagnetometerMeasurement | ImageMeasurement | GpsMeasurement | ReferenceMeasurement:
+    def __next__(self) -> ImuMeasurement | MagnetometerMeasurement | ImageMeasurement | GpsMeasurement | ReferenceMeasurement | OdometryMeasurement | FeaturesMeasurement:
         ...
     def counts(self) -> dict[str, int]:
         """
@@ -3025,6 +3750,1166 @@ class NmeaFixes:
         """
         (N, 3) [m/s], up is NaN
         """
+class MotionArrays:
+    """
+    States of a motion at N times.
+    """
+    @property
+    def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [m/s^2], in world, without gravity
+        """
+    @property
+    def angular_acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [rad/s^2], in body axes
+        """
+    @property
+    def angular_velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [rad/s], in body axes
+        """
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [m], of body in world
+        """
+    @property
+    def q_world_body_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 4)
+        """
+    @property
+    def times_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N,)
+        """
+    @property
+    def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [m/s], in world
+        """
+class Motion:
+    """
+    True motion of a body: what simulated sensors measure, without noise. World has z up; vehicles: x forward, y left, z up.
+    """
+    def sample(self, times_s: numpy.typing.NDArray[numpy.float64]) -> MotionArrays:
+        """
+        States at times_s, float64 (N,), each in [0, duration_s]; in any order. Raises ValueError naming the time.
+        """
+    @property
+    def duration_s(self) -> float:
+        """
+        inf for motions that go on for ever
+        """
+class WaypointMotion(Motion):
+    """
+    A ground vehicle that passes way-points at given times: clothoids through the points with their courses, cubic distance over time with the given speeds, height a cubic (with the given vertical velocities, else shape-preserving), yaw along the path. The same place twice is a stop.
+    """
+    def __init__(self, times_s: numpy.typing.ArrayLike, positions: numpy.typing.ArrayLike, velocities: numpy.typing.ArrayLike | None = None, courses_rad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex | None] = []) -> None:
+        """
+        times_s (N,), positions (N, 3) [m]; velocities (N, 3) [m/s]: none are estimated; courses_rad: N numbers or None, from x towards y, for points where the velocity is zero or not given; those left out are estimated. Raises ValueError naming index and value.
+        """
+    @property
+    def courses_rad(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N,) as used, without steps of two pi.
+        """
+    @property
+    def length(self) -> float:
+        """
+        Of the horizontal path [m].
+        """
+class LookAtMotion(Motion):
+    """
+    A camera (x right, y down, z forward) on a spline of positions that looks at a spline of points; both have two continuous derivatives. q_world_body_wxyz is that of the camera.
+    """
+    def __init__(self, times_s: numpy.typing.ArrayLike, positions: numpy.typing.ArrayLike, look_at: numpy.typing.ArrayLike, *, up: numpy.typing.ArrayLike | None = None, smallest_distance_m: typing.SupportsFloat | typing.SupportsIndex = 0.01, smallest_angle_rad: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> None:
+        """
+        times_s (N,), positions and look_at (N, 3) [m]; up (3,), by default z. Raises ValueError naming the time at which the camera comes closer to the point than smallest_distance_m, or looks more steeply up or down than smallest_angle_rad.
+        """
+class RestMotion(Motion):
+    """
+    Stays where it is.
+    """
+    def __init__(self, T_world_body: Pose3 | None = None) -> None:
+        ...
+class CircleMotion(Motion):
+    """
+    Horizontal circle with constant speed; body x along it. Negative speed: clockwise.
+    """
+    def __init__(self, *, center: numpy.typing.ArrayLike | None = None, radius_m: typing.SupportsFloat | typing.SupportsIndex = 10.0, speed_mps: typing.SupportsFloat | typing.SupportsIndex = 5.0, start_angle_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+class FigureEightMotion(Motion):
+    """
+    x = length/2 sin u, y = width/2 sin 2u, z = height/2 sin u, u = 2 pi t/period.
+    """
+    def __init__(self, *, center: numpy.typing.ArrayLike | None = None, length_m: typing.SupportsFloat | typing.SupportsIndex = 40.0, width_m: typing.SupportsFloat | typing.SupportsIndex = 20.0, height_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, period_s: typing.SupportsFloat | typing.SupportsIndex = 30.0) -> None:
+        ...
+class HandHeldMotion(Motion):
+    """
+    A sensor shaken and turned by hand about a mean pose: sums of sines in six axes, frequencies and phases drawn at random. rotates and moves switch axes of the mean pose off, and leave the others as they were.
+    """
+    def __init__(self, random: Random, *, T_world_mean: Pose3 | None = None, angular_rate_rms: typing.SupportsFloat | typing.SupportsIndex = 0.9, acceleration_rms: typing.SupportsFloat | typing.SupportsIndex = 1.5, lowest_hz: typing.SupportsFloat | typing.SupportsIndex = 0.3, highest_hz: typing.SupportsFloat | typing.SupportsIndex = 2.0, scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, rotates: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(3)"] = [True, True, True], moves: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(3)"] = [True, True, True]) -> None:
+        """
+        Takes a copy of random, which is left as it was.
+        """
+class CarMotion(Motion):
+    """
+    phases (N, 3): duration [s], speed at the end [m/s], turn to the left [rad], each passed smoothly; by default round a block. Exactly at rest between speeds of zero.
+    """
+    def __init__(self, phases: numpy.typing.ArrayLike | None = None, *, start: numpy.typing.ArrayLike | None = None, course_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0, speed_mps: typing.SupportsFloat | typing.SupportsIndex = 0.0, cycles: typing.SupportsInt | typing.SupportsIndex | None = None) -> None:
+        ...
+class PedestrianMotion(Motion):
+    """
+    phases as of CarMotion, by default round a square with pauses; bob, sway, nod and roll with the steps, glances to both sides.
+    """
+    def __init__(self, phases: numpy.typing.ArrayLike | None = None, *, start: numpy.typing.ArrayLike | None = None, course_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0, speed_mps: typing.SupportsFloat | typing.SupportsIndex = 0.0, cycles: typing.SupportsInt | typing.SupportsIndex | None = None, step_length_m: typing.SupportsFloat | typing.SupportsIndex = 0.74, walking_speed_mps: typing.SupportsFloat | typing.SupportsIndex = 1.4, bob_m: typing.SupportsFloat | typing.SupportsIndex = 0.02, sway_m: typing.SupportsFloat | typing.SupportsIndex = 0.015, nod_rad: typing.SupportsFloat | typing.SupportsIndex = 0.015, roll_rad: typing.SupportsFloat | typing.SupportsIndex = 0.02, head_turn_rad: typing.SupportsFloat | typing.SupportsIndex = 0.6, head_turn_s: typing.SupportsFloat | typing.SupportsIndex = 2.5, head_turn_period_s: typing.SupportsFloat | typing.SupportsIndex = 7.0) -> None:
+        ...
+class MountedMotion(Motion):
+    """
+    A sensor fixed to a moving body: its own pose, velocity, acceleration and rates.
+    """
+    def __init__(self, body: Motion, T_body_sensor: Pose3) -> None:
+        ...
+class RestFirstMotion(Motion):
+    """
+    A motion after a rest: then its own time begins to run, at a rate that goes smoothly from 0 to 1 in ease_s.
+    """
+    def __init__(self, motion: Motion, *, rest_s: typing.SupportsFloat | typing.SupportsIndex = 2.0, ease_s: typing.SupportsFloat | typing.SupportsIndex = 2.0) -> None:
+        ...
+    def motion_time_s(self, time_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        The motion's own time at a time of this one.
+        """
+class Camera:
+    """
+    Projection of a calibrated camera. Points are in its axes (x right, y down, z forward) [m]; pixel (0, 0) is the centre of the top-left one. Rows without an answer are NaN: behind the camera, or outside the radius at which the distortion folds back.
+    """
+    def __init__(self, calibration: CameraCalibration) -> None:
+        ...
+    def in_image(self, pixels: numpy.typing.NDArray[numpy.float64], border_px: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        bool (N,): at least so far from the image's border.
+        """
+    def project(self, points: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Points (N, 3) to pixels (N, 2).
+        """
+    def project_with_jacobians(self, points: numpy.typing.NDArray[numpy.float64]) -> tuple:
+        """
+        (pixels (N, 2), their derivatives by the point (N, 2, 3), and by fx fy cx cy and the distortion (N, 2, 8)).
+        """
+    def unproject(self, pixels: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Pixels (N, 2) to unit vectors (N, 3).
+        """
+    @property
+    def max_angle(self) -> float:
+        """
+        Of a ray to the optical axis [rad].
+        """
+class Scene:
+    """
+    What a simulated camera looks at: points, and textured faces for pictures of them.
+    """
+    def __init__(self, points: numpy.typing.ArrayLike) -> None:
+        """
+        Points (N, 3) in world [m], seen from everywhere.
+        """
+    def add(self, other: Scene, T_world_other: Pose3 | None = None) -> int:
+        """
+        Adds another scene, moved. Returns the row of its first point.
+        """
+    def visible_from(self, eye: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        bool (N,): the points that no face hides from a place (3,).
+        """
+    @property
+    def faces(self) -> int:
+        """
+        how many
+        """
+    @property
+    def points(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) in world [m]; the row is the identity of a feature
+        """
+class StreetModel:
+    """
+    Measures of a street [m]; every field is a keyword: StreetModel(road_width_m=6).
+    """
+    def __init__(self, **kwargs) -> None:
+        ...
+    @property
+    def extend_m(self) -> float:
+        """
+        straight on before and beyond the path
+        """
+    @extend_m.setter
+    def extend_m(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def kinds(self) -> int:
+        """
+        different houses
+        """
+    @kinds.setter
+    def kinds(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def largest_gap_m(self) -> float:
+        """
+        between houses
+        """
+    @largest_gap_m.setter
+    def largest_gap_m(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_facade_m(self) -> float:
+        ...
+    @max_facade_m.setter
+    def max_facade_m(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_height_m(self) -> float:
+        ...
+    @max_height_m.setter
+    def max_height_m(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_facade_m(self) -> float:
+        ...
+    @min_facade_m.setter
+    def min_facade_m(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_height_m(self) -> float:
+        ...
+    @min_height_m.setter
+    def min_height_m(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def pavement_m(self) -> float:
+        """
+        between road and facades
+        """
+    @pavement_m.setter
+    def pavement_m(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def road_width_m(self) -> float:
+        ...
+    @road_width_m.setter
+    def road_width_m(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def window_m(self) -> float:
+        """
+        distance of windows, about; four features each
+        """
+    @window_m.setter
+    def window_m(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class CameraModel:
+    """
+    A simulated camera with its feature tracker; every field is a keyword: CameraModel(sigma_px=0.3).
+    """
+    def __init__(self, **kwargs) -> None:
+        ...
+    def check(self) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    @property
+    def border_px(self) -> float:
+        """
+        no features nearer to the image's border
+        """
+    @border_px.setter
+    def border_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def loss_rate(self) -> float:
+        """
+        probability of losing a track in view, per frame
+        """
+    @loss_rate.setter
+    def loss_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_depth_m(self) -> float:
+        ...
+    @max_depth_m.setter
+    def max_depth_m(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_features(self) -> int:
+        """
+        0: no limit
+        """
+    @max_features.setter
+    def max_features(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_depth_m(self) -> float:
+        ...
+    @min_depth_m.setter
+    def min_depth_m(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_separation_px(self) -> float:
+        """
+        of a new feature from the others
+        """
+    @min_separation_px.setter
+    def min_separation_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def new_id_rate(self) -> float:
+        """
+        share of found ones that get a new identity
+        """
+    @new_id_rate.setter
+    def new_id_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def occlusion(self) -> bool:
+        """
+        faces hide what is behind them
+        """
+    @occlusion.setter
+    def occlusion(self, arg0: bool) -> None:
+        ...
+    @property
+    def outlier_rate(self) -> float:
+        """
+        share that is anywhere in the image
+        """
+    @outlier_rate.setter
+    def outlier_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rate_hz(self) -> float:
+        ...
+    @rate_hz.setter
+    def rate_hz(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def reappear_rate(self) -> float:
+        """
+        probability of finding a lost one in view, per frame
+        """
+    @reappear_rate.setter
+    def reappear_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_px(self) -> float:
+        """
+        white noise of each coordinate
+        """
+    @sigma_px.setter
+    def sigma_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def stamp_jitter_s(self) -> float:
+        ...
+    @stamp_jitter_s.setter
+    def stamp_jitter_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def start_time_ns(self) -> int:
+        """
+        time 0 of the motion on the IMU's clock
+        """
+    @start_time_ns.setter
+    def start_time_ns(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def wrong_id_rate(self) -> float:
+        """
+        share that changed identities with another one
+        """
+    @wrong_id_rate.setter
+    def wrong_id_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class CameraRun:
+    """
+    F frames of a simulated camera, and the M features of all of them in order.
+    """
+    @property
+    def depth_m(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M,) along the optical axis
+        """
+    @property
+    def feature(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (M,) measured identity
+        """
+    @property
+    def frame(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (M,) index of the frame
+        """
+    @property
+    def outlier(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        (M,) bool
+        """
+    @property
+    def pixel_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, 2) measured, u and v
+        """
+    @property
+    def point(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (M,) truth: row of the scene's points
+        """
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (F, 3) of camera in world [m]
+        """
+    @property
+    def q_world_camera_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (F, 4)
+        """
+    @property
+    def time_ns(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (F,) stamps, on the camera's clock
+        """
+    @property
+    def true_pixel_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, 2)
+        """
+    @property
+    def true_time_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (F,) since the start of the motion
+        """
+    @property
+    def wrong_id(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        (M,) bool
+        """
+class SceneRenderer:
+    """
+    Pictures of a scene as a calibrated camera takes them.
+    """
+    def __init__(self, scene: Scene, calibration: CameraCalibration, *, format: str = 'grey', texel_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, blur_px: typing.SupportsFloat | typing.SupportsIndex = 2.0, gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, noise_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def render(self, T_world_camera: Pose3 | collections.abc.Sequence[Pose3], random: Random = None) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        uint8 (height, width) or (height, width, 3). Several poses: their mean, as motion blur.
+        """
+class ImuSampleModel(enum.Enum):
+    """
+    Which true value a reading of a simulated IMU stands for.
+    """
+    INCREMENT: typing.ClassVar[ImuSampleModel]
+    INTERVAL_MEAN: typing.ClassVar[ImuSampleModel]
+    POINT: typing.ClassVar[ImuSampleModel]
+    @classmethod
+    def __new__(cls, value):
+        ...
+class InertialTriadModel:
+    """
+    A simulated gyroscope [u = rad/s] or accelerometer [u = m/s^2].
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def constant_bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [u]
+        """
+    @constant_bias.setter
+    def constant_bias(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def instability_sigma(self) -> float:
+        """
+        [u], Gauss-Markov part of the bias
+        """
+    @instability_sigma.setter
+    def instability_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def instability_time_s(self) -> float:
+        """
+        its time constant [s]
+        """
+    @instability_time_s.setter
+    def instability_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def matrix(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 3) scale and misalignment
+        """
+    @matrix.setter
+    def matrix(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def noise_density(self) -> float:
+        """
+        [u/sqrt(Hz)], white
+        """
+    @noise_density.setter
+    def noise_density(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def random_walk(self) -> float:
+        """
+        [u/s/sqrt(Hz)], of the bias
+        """
+    @random_walk.setter
+    def random_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def range(self) -> float:
+        """
+        [u], saturates beyond
+        """
+    @range.setter
+    def range(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def resolution(self) -> float:
+        """
+        [u], step of a reading; 0: not rounded
+        """
+    @resolution.setter
+    def resolution(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def turn_on_bias_sigma(self) -> float:
+        """
+        [u], drawn once a run
+        """
+    @turn_on_bias_sigma.setter
+    def turn_on_bias_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class ImuModel:
+    """
+    A simulated IMU: reading = round(matrix * truth + bias + white noise).
+    """
+    accelerometer: InertialTriadModel
+    gyroscope: InertialTriadModel
+    sampling: ImuSampleModel
+    @staticmethod
+    def consumer() -> ImuModel:
+        """
+        MEMS of a phone, 200 Hz.
+        """
+    @staticmethod
+    def perfect(rate_hz: typing.SupportsFloat | typing.SupportsIndex = 200.0) -> ImuModel:
+        """
+        No error at all.
+        """
+    @staticmethod
+    def vio_example() -> ImuModel:
+        """
+        That of the example "Visual-Inertial Odometry Using Synthetic Data", with the sign of specific force.
+        """
+    def __init__(self) -> None:
+        ...
+    def calibration(self) -> ImuCalibration:
+        """
+        What calibration would tell of it.
+        """
+    def check(self) -> None:
+        """
+        Raises ValueError naming the field and its value.
+        """
+    @property
+    def accelerometer_sign(self) -> int:
+        """
+        1: specific force, +9.81 upwards at rest; -1: its negative
+        """
+    @accelerometer_sign.setter
+    def accelerometer_sign(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gravity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [m/s^2], in world
+        """
+    @gravity.setter
+    def gravity(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def rate_hz(self) -> float:
+        """
+        [Hz]
+        """
+    @rate_hz.setter
+    def rate_hz(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class MagnetometerModel:
+    """
+    A simulated magnetometer: reading = soft_iron * field + hard_iron + noise.
+    """
+    def __init__(self) -> None:
+        ...
+    def add_dipole(self, position: numpy.typing.ArrayLike, moment: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> None:
+        """
+        A magnet at a place in world [m], moment [A m^2]; within radius [m] its field grows no more.
+        """
+    def add_disturbance(self, begin_s: typing.SupportsFloat | typing.SupportsIndex, end_s: typing.SupportsFloat | typing.SupportsIndex, field: numpy.typing.ArrayLike) -> None:
+        """
+        A field in world [T] that is there for a while.
+        """
+    def check(self) -> None:
+        """
+        Raises ValueError naming the field and its value.
+        """
+    @property
+    def field(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [T], of the world
+        """
+    @field.setter
+    def field(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def hard_iron(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [T]
+        """
+    @hard_iron.setter
+    def hard_iron(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def range(self) -> float:
+        """
+        [T], saturates beyond
+        """
+    @range.setter
+    def range(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rate_hz(self) -> float:
+        """
+        [Hz]
+        """
+    @rate_hz.setter
+    def rate_hz(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def resolution(self) -> float:
+        """
+        [T]; 0: not rounded
+        """
+    @resolution.setter
+    def resolution(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma(self) -> float:
+        """
+        [T], white, of a sample
+        """
+    @sigma.setter
+    def sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def soft_iron(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 3)
+        """
+    @soft_iron.setter
+    def soft_iron(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+class VisualOdometryModel:
+    """
+    A simulated visual odometry: scale, white noise, drift; the defaults are the example's.
+    """
+    @staticmethod
+    def perfect(rate_hz: typing.SupportsFloat | typing.SupportsIndex = 25.0) -> VisualOdometryModel:
+        """
+        Metres, no error.
+        """
+    def __init__(self) -> None:
+        ...
+    def check(self) -> None:
+        """
+        Raises ValueError naming the field and its value.
+        """
+    @property
+    def T_body_odometry(self) -> Pose3:
+        """
+        where the odometry's own axes are
+        """
+    @T_body_odometry.setter
+    def T_body_odometry(self, arg0: Pose3) -> None:
+        ...
+    @property
+    def drift_frames(self) -> float:
+        """
+        time constant of the drift in frames
+        """
+    @drift_frames.setter
+    def drift_frames(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def drift_sigma(self) -> float:
+        """
+        [unit]
+        """
+    @drift_sigma.setter
+    def drift_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def drift_start(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [unit], before the first frame
+        """
+    @drift_start.setter
+    def drift_start(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def drift_step_sigma(self) -> float:
+        """
+        [unit], of one step of the drift
+        """
+    @property
+    def latency_s(self) -> float:
+        """
+        arrival after the frame [s]
+        """
+    @latency_s.setter
+    def latency_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def outages(self) -> list[tuple[float, float]]:
+        """
+        [(begin, end), ...] [s]: no measurement
+        """
+    @outages.setter
+    def outages(self, arg1: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    @property
+    def outlier_fraction(self) -> float:
+        """
+        share of frames
+        """
+    @outlier_fraction.setter
+    def outlier_fraction(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def outlier_orientation(self) -> float:
+        """
+        [rad]
+        """
+    @outlier_orientation.setter
+    def outlier_orientation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def outlier_position(self) -> float:
+        """
+        [unit]
+        """
+    @outlier_position.setter
+    def outlier_position(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rate_hz(self) -> float:
+        """
+        [Hz]
+        """
+    @rate_hz.setter
+    def rate_hz(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def relative(self) -> bool:
+        """
+        True: pose since the frame before
+        """
+    @relative.setter
+    def relative(self, arg0: bool) -> None:
+        ...
+    @property
+    def scale(self) -> float:
+        """
+        [unit/m]
+        """
+    @scale.setter
+    def scale(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def scale_walk(self) -> float:
+        """
+        [1/sqrt(s)], random walk of the scale's logarithm
+        """
+    @scale_walk.setter
+    def scale_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_orientation(self) -> float:
+        """
+        [rad], white
+        """
+    @sigma_orientation.setter
+    def sigma_orientation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_position(self) -> float:
+        """
+        [unit], white
+        """
+    @sigma_position.setter
+    def sigma_position(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def stamp_delay_s(self) -> float:
+        """
+        stamps are later than the frame by this [s]
+        """
+    @stamp_delay_s.setter
+    def stamp_delay_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def told_sigma_orientation(self) -> float:
+        """
+        [rad]; NaN: 0.01
+        """
+    @told_sigma_orientation.setter
+    def told_sigma_orientation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def told_sigma_position(self) -> float:
+        """
+        [unit]; NaN: sigma_position
+        """
+    @told_sigma_position.setter
+    def told_sigma_position(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class GpsModel:
+    """
+    A simulated GPS receiver: white and Gauss-Markov errors.
+    """
+    fix: GpsFixType
+    with_velocity: bool
+    @staticmethod
+    def rtk() -> GpsModel:
+        """
+        Fixed ambiguities: 1 cm and 2 cm, 5 Hz.
+        """
+    @staticmethod
+    def single() -> GpsModel:
+        """
+        A consumer's receiver: 0.5 m white, 1.5 m coloured, 1 Hz.
+        """
+    def __init__(self) -> None:
+        ...
+    def check(self) -> None:
+        """
+        Raises ValueError naming the field and its value.
+        """
+    @property
+    def antenna_in_body(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) lever arm [m]
+        """
+    @antenna_in_body.setter
+    def antenna_in_body(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def coloured_sigma_horizontal(self) -> float:
+        """
+        [m], Gauss-Markov
+        """
+    @coloured_sigma_horizontal.setter
+    def coloured_sigma_horizontal(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def coloured_sigma_vertical(self) -> float:
+        """
+        [m], Gauss-Markov
+        """
+    @coloured_sigma_vertical.setter
+    def coloured_sigma_vertical(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def coloured_time_s(self) -> float:
+        """
+        its time constant [s]
+        """
+    @coloured_time_s.setter
+    def coloured_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def latency_s(self) -> float:
+        """
+        arrival after the time of validity [s]
+        """
+    @latency_s.setter
+    def latency_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """
+        latitude, longitude [rad], altitude [m] of the world's origin
+        """
+    @origin.setter
+    def origin(self, arg1: tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def outages(self) -> list[tuple[float, float]]:
+        """
+        [(begin, end), ...] [s]: no fix
+        """
+    @outages.setter
+    def outages(self, arg1: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    @property
+    def rate_hz(self) -> float:
+        """
+        [Hz]
+        """
+    @rate_hz.setter
+    def rate_hz(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def satellites(self) -> int:
+        ...
+    @satellites.setter
+    def satellites(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_horizontal(self) -> float:
+        """
+        [m], white
+        """
+    @sigma_horizontal.setter
+    def sigma_horizontal(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_velocity_horizontal(self) -> float:
+        """
+        [m/s]
+        """
+    @sigma_velocity_horizontal.setter
+    def sigma_velocity_horizontal(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_velocity_vertical(self) -> float:
+        """
+        [m/s]
+        """
+    @sigma_velocity_vertical.setter
+    def sigma_velocity_vertical(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_vertical(self) -> float:
+        """
+        [m], white
+        """
+    @sigma_vertical.setter
+    def sigma_vertical(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def stamp_delay_s(self) -> float:
+        """
+        stamps are later than validity by this [s]
+        """
+    @stamp_delay_s.setter
+    def stamp_delay_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class StreamClockModel:
+    """
+    The clock of a simulated sensor; perfect unless changed. More of it by Scenario.set: imu.clock.delay_exponential_ns, ...
+    """
+    @staticmethod
+    def usb() -> StreamClockModel:
+        """
+        Own oscillator, 50 ppm off; delays of a USB device.
+        """
+    def __init__(self) -> None:
+        ...
+    @property
+    def loss_fraction(self) -> float:
+        """
+        share of samples that never arrive
+        """
+    @loss_fraction.setter
+    def loss_fraction(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def offset_s(self) -> float:
+        """
+        of the stamps, at the start [s]
+        """
+    @offset_s.setter
+    def offset_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class ScenarioStreams:
+    """
+    Which streams a scenario has.
+    """
+    features: bool
+    gps: bool
+    imu: bool
+    magnetometer: bool
+    odometry: bool
+    reference: bool
+class Scenario:
+    """
+    A motion, the sensors that ride on it and the world around them. Change the models, then simulate() it.
+    """
+    gps: GpsModel
+    gps_clock: StreamClockModel
+    imu: ImuModel
+    imu_clock: StreamClockModel
+    magnetometer: MagnetometerModel
+    magnetometer_clock: StreamClockModel
+    name: str
+    odometry: VisualOdometryModel
+    odometry_clock: StreamClockModel
+    streams: ScenarioStreams
+    def __init__(self, name: str, *, duration_s: typing.SupportsFloat | typing.SupportsIndex | None = None, parameters: dict = {}) -> None:
+        """
+        A named one (scenario_names()). duration_s [s]: None: 60. parameters: {name: value}, as set() takes them.
+        """
+    def check(self) -> None:
+        """
+        Raises ValueError naming the field and its value.
+        """
+    def parameters(self) -> dict[str, str]:
+        """
+        All parameters and their values as text.
+        """
+    def rig(self) -> Rig:
+        """
+        What a careful calibration of the sensors would give.
+        """
+    def set(self, name: str, value: typing.Any) -> None:
+        """
+        Sets a parameter by name: "imu.sampling", "odometry.latency_s", "gps.outages", "camera.sigma_px"; see parameters(). Raises ValueError naming it.
+        """
+    @property
+    def description(self) -> str:
+        ...
+    @property
+    def duration_s(self) -> float:
+        """
+        [s], at most that of the motion
+        """
+    @duration_s.setter
+    def duration_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def motion(self) -> Motion:
+        """
+        True motion.
+        """
+    @motion.setter
+    def motion(self, arg1: Motion) -> None:
+        ...
+    @property
+    def reference_rate_hz(self) -> float:
+        """
+        [Hz] of the truth
+        """
+    @reference_rate_hz.setter
+    def reference_rate_hz(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def start_time_ns(self) -> int:
+        """
+        of time 0 of the motion, since 1970
+        """
+    @start_time_ns.setter
+    def start_time_ns(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class TruthArrays:
+    """
+    What was true, at the times of the reference measurements; NaN for sensors that the scenario has not.
+    """
+    @property
+    def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [m/s^2], in world, without gravity
+        """
+    @property
+    def accelerometer_bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [m/s^2], likewise
+        """
+    @property
+    def angular_velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [rad/s], body axes
+        """
+    @property
+    def gps_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [m], coloured part, east north up
+        """
+    @property
+    def gyroscope_bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [rad/s], of readings corrected with the rig
+        """
+    @property
+    def odometry_drift(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [unit]
+        """
+    @property
+    def odometry_scale(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N,) [unit/m]
+        """
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [m], in world
+        """
+    @property
+    def q_world_body_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 4)
+        """
+    @property
+    def times_ns(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (N,) int64
+        """
+    @property
+    def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [m/s], in world
+        """
+class SimulatedRun:
+    """
+    A whole simulated recording with its truth.
+    """
+    @property
+    def recording(self) -> typing.Any:
+        """
+        Recording, as read_recording() gives one.
+        """
+    @property
+    def truth(self) -> TruthArrays:
+        ...
+class Simulation(MeasurementSource):
+    """
+    Runs a scenario and gives one measurement after the other; the same seed gives the same ones.
+    """
+    def __init__(self, scenario: Scenario, seed: typing.SupportsInt | typing.SupportsIndex, *, order: str = 'time') -> None:
+        """
+        order: "time" (of the stamps), or "arrival" (late ones come late).
+        """
+    def truth(self) -> TruthArrays:
+        """
+        Of the reference measurements so far.
+        """
 def absolute_error(estimate: Trajectory, reference: Trajectory, alignment: str = 'se3') -> AbsoluteError:
     """
     Of paired trajectories (see associate). alignment: "se3", "sim3", "yaw" or "none". DataError when the poses do not determine it.
@@ -3049,6 +4934,10 @@ def analyse_imu_noise(times_ns: numpy.typing.NDArray[numpy.int64], gyroscope: nu
     """
     int64 (N,); float64 (N, 3) [rad/s] and [m/s^2], one may be None. Bad data do not raise: see quality.
     """
+def april_grid(*, columns: typing.SupportsInt | typing.SupportsIndex = 6, rows: typing.SupportsInt | typing.SupportsIndex = 6, tag_m: typing.SupportsFloat | typing.SupportsIndex = 0.088, spacing: typing.SupportsFloat | typing.SupportsIndex = 0.3, first_tag: typing.SupportsInt | typing.SupportsIndex = 0, corner_squares: bool = True) -> Scene:
+    """
+    Kalibr's board of tags 36h11. Points are the tags' corners: 4 * tag + corner, lower left first, against the clock.
+    """
 def associate(estimate: Trajectory, reference: Trajectory, *, max_difference_ns: typing.SupportsInt | typing.SupportsIndex = 10000000, estimate_time_offset_ns: typing.SupportsInt | typing.SupportsIndex = 0, interpolate_reference: bool = False, one_to_one: bool = True) -> Association:
     """
     Pairs each pose of the shorter trajectory with the nearest in time of the other. DataError when nothing pairs.
@@ -3061,9 +4950,17 @@ def beta_from_gyro(noise: ImuNoise, bias_residual: typing.SupportsFloat | typing
     """
     beta [rad/s] that covers the rates by which the gyroscope can be wrong: bias_residual [rad/s], scale_error (relative) at max_rate [rad/s], and noise at samples dt_s [s] apart.
     """
+def box_room(random: Random, *, size_m: numpy.typing.ArrayLike = (8.0, 6.0, 3.0), cell_m: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> Scene:
+    """
+    A room seen from inside, origin in the middle of its floor; one feature in each cell of its walls.
+    """
 def calibrate_clock(times_ns: numpy.typing.NDArray[numpy.int64], host_times_ns: numpy.typing.NDArray[numpy.int64], **kwargs) -> ClockCalibrationResult:
     """
     Stamps and arrivals of one stream, int64 (N,) in the order of arrival; options as of ClockModel.
+    """
+def checkerboard(*, columns: typing.SupportsInt | typing.SupportsIndex = 9, rows: typing.SupportsInt | typing.SupportsIndex = 6, square_m: typing.SupportsFloat | typing.SupportsIndex = 0.04) -> Scene:
+    """
+    Points are the inner corners: row * columns + column. Target: x right, y up, z out of the board.
     """
 def chi_square_cdf(x: typing.SupportsFloat | typing.SupportsIndex, dof: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
@@ -3084,6 +4981,10 @@ def error_statistics(errors: numpy.typing.NDArray[numpy.float64]) -> ErrorStatis
 def estimate_time_offset(times_ns: numpy.typing.NDArray[numpy.int64], positions: numpy.typing.NDArray[numpy.float64], reference_times_ns: numpy.typing.NDArray[numpy.int64], reference_positions: numpy.typing.NDArray[numpy.float64], *, reference_velocities: typing.Any = None, reference_q_world_body_wxyz: typing.Any = None, max_offset_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, horizontal: bool = True, max_reference_gap_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, estimate_bias: bool = False, estimate_lever_arm: bool = False, lever_arm: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), correlation_s: typing.SupportsFloat | typing.SupportsIndex = 120.0, bias_sigma_m: typing.SupportsFloat | typing.SupportsIndex = 1.5) -> TimeOffsetResult:
     """
     By how much the stamps of a position stream are off against a reference trajectory in the same world (z up): t_reference = t_stream + offset_s. int64 (N,), float64 (N, 3) [m]; NaN rows are skipped. DataError names the index where times do not increase.
+    """
+def example_drive() -> dict:
+    """
+    Arguments of WaypointMotion: the drive of the example 'Visual-Inertial Odometry Using Synthetic Data'.
     """
 def find_stillness(times_ns: numpy.typing.NDArray[numpy.int64], gyroscope: numpy.typing.NDArray[numpy.float64] | None, accelerometer: numpy.typing.NDArray[numpy.float64] | None, options: StillnessOptions = ...) -> Stillness:
     """
@@ -3147,9 +5048,9 @@ def open_broad(path: os.PathLike | str | bytes, *, reference: bool = True) -> Me
     """
 def open_csv(path: os.PathLike | str | bytes, *, time_unit: str = '', angular_velocity_unit: str = '', specific_force_unit: str = '', magnetic_field_unit: str = '', tesla_per_unit: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> MeasurementSource:
     """
-    A CSV file whose first line names columns and units: time_ns or "t [s]", wx wy wz, ax ay az, mx my mz, qw qx qy qz, px py pz ... The units given here are for headings that have none.
+    A CSV file whose first line names columns and units: time_ns or "t [s]", wx wy wz, ax ay az, mx my mz, qw qx qy qz, px py pz, latitude longitude altitude, odo_px odo_py odo_pz ... The units given here are for headings that have none.
     """
-def open_euroc(folder: os.PathLike | str | bytes, *, reference: bool = True, magnetometer: bool = True) -> MeasurementSource:
+def open_euroc(folder: os.PathLike | str | bytes, *, reference: bool = True, magnetometer: bool = True, gps: bool = True, odometry: bool = True) -> MeasurementSource:
     """
     A EuRoC / ASL recording: the folder that holds mav0.
     """
@@ -3181,9 +5082,17 @@ def read_any_rig(path: os.PathLike | str | bytes) -> Rig:
     """
     rig.yaml, Kalibr's camchain or imu.yaml, EuRoC's sensor.yaml: whichever it is.
     """
+def read_points(path: os.PathLike | str | bytes) -> tuple[numpy.typing.NDArray[numpy.float64], dict[str, int]]:
+    """
+    Points (N, 3) from a text file with x y z a line, and what was read and skipped.
+    """
 def read_rig(path: os.PathLike | str | bytes) -> Rig:
     """
     rig.yaml. DataError names file, line, key and value.
+    """
+def read_tracks(path: os.PathLike | str | bytes) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64], dict[str, int]]:
+    """
+    A tracks file (rows `frame feature dimension value`): frame (M,), feature (M,), pixel_px (M, 2), and what was read and skipped. DataError names file, line and value.
     """
 def read_tum(path: os.PathLike | str | bytes) -> tuple[Trajectory, dict[str, int]]:
     """
@@ -3197,6 +5106,22 @@ def root_mean_square(values: numpy.typing.NDArray[numpy.float64]) -> float:
     """
     Root mean square of float64 values (N,). ValueError when empty.
     """
+def sampled_path(motion: Motion, spacing_m: typing.SupportsFloat | typing.SupportsIndex = 1.0, height_m: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Where a motion goes, for street(): (N, 3), all at one height.
+    """
+def scenario_names() -> dict[str, str]:
+    """
+    The named scenarios and what they are.
+    """
+def simulate(scenario: Scenario | str, seed: typing.SupportsInt | typing.SupportsIndex, *, duration_s: typing.SupportsFloat | typing.SupportsIndex | None = None, parameters: dict = {}, order: str = 'time') -> SimulatedRun:
+    """
+    A whole run as arrays, with its truth. scenario: a Scenario or the name of one; parameters: {name: value}, as Scenario.set takes them. The same seed gives the same numbers.
+    """
+def simulate_camera(motion: Motion, calibration: CameraCalibration, scene: Scene, random: Random, model: CameraModel | None = None, duration_s: typing.SupportsFloat | typing.SupportsIndex | None = None) -> CameraRun:
+    """
+    What a camera on a moving body sees of a scene, with the truth. The calibration is the true one; its time_offset_s is how much the stamps are early.
+    """
 def simulate_clock(scenario: str, duration_s: typing.SupportsFloat | typing.SupportsIndex, random: Random) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
     """
     'usb_imu' (200 Hz), 'pps' or 'nmea_only': (device_times_ns, host_times_ns, truth_ns), int64 (N,) each; the truth is true host time + minimum delay.
@@ -3204,6 +5129,10 @@ def simulate_clock(scenario: str, duration_s: typing.SupportsFloat | typing.Supp
 def simulate_gps_time(duration_s: typing.SupportsFloat | typing.SupportsIndex, random: Random, with_pulses: bool = True, label_next: bool = False) -> tuple[numpy.typing.NDArray[numpy.bool], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
     """
     (is_pulse, host_times_ns, gps_times_ns) as GpsClock.update takes them, then the truth second by second: host times and GPS times, int64 (M,).
+    """
+def street(path: numpy.typing.ArrayLike, random: Random, model: StreetModel | None = None) -> Scene:
+    """
+    Facades on both sides of a path (N, 3) on the ground [m], and the road.
     """
 def unix_from_gps(gps_time_ns: typing.SupportsInt | typing.SupportsIndex, *, leap_seconds: typing.SupportsInt | typing.SupportsIndex | None = None) -> int:
     """
@@ -3213,20 +5142,29 @@ def update_rig(path: os.PathLike | str | bytes, change: collections.abc.Callable
     """
     Reads rig.yaml (an empty rig when there is none), calls change(rig), which alters it, and writes it. What is not changed stays as it was to the last bit, but comments are lost. When anything raises, the file stays as it was.
     """
+def write_points(path: os.PathLike | str | bytes, points: numpy.typing.ArrayLike) -> None:
+    ...
 def write_rig(path: os.PathLike | str | bytes, rig: Rig) -> None:
     """
     Writes rig.yaml; read_rig gives the same numbers back.
+    """
+def write_tracks(path: os.PathLike | str | bytes, frame: numpy.typing.NDArray[numpy.int64], feature: numpy.typing.NDArray[numpy.int64], pixel_px: numpy.typing.NDArray[numpy.float64]) -> None:
+    """
+    Writes a tracks file from arrays (M,), (M,), (M, 2); frames must ascend.
     """
 def write_tum(path: os.PathLike | str | bytes, trajectory: Trajectory) -> None:
     """
     Writes a trajectory in TUM's format.
     """
 ESTIMATE_CHANNEL: str = 'LOC_ESTIMATE'
+FUSION_CHANNEL: str = 'LOC_FUSION'
 GPS_CHANNEL: str = 'LOC_GPS'
 IMAGE_CHANNEL: str = 'LOC_IMAGE'
 IMU_CHANNEL: str = 'LOC_IMU'
 MAGNETOMETER_CHANNEL: str = 'LOC_MAGNETOMETER'
 NO_TIME: int = -9223372036854775808
+ODOMETRY_CHANNEL: str = 'LOC_ODOMETRY'
 REFERENCE_CHANNEL: str = 'LOC_REFERENCE'
 SOURCE_STATUS_CHANNEL: str = 'LOC_SOURCE_STATUS'
 STATISTICS_CHANNEL: str = 'LOC_STATISTICS'
+TRACKS_CHANNEL: str = 'LOC_TRACKS'
