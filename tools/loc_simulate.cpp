@@ -90,13 +90,13 @@ int main(int argc, char** argv) {
   for (std::size_t i = 0; i < kShortcuts.size(); ++i) {
     app.add_option(kShortcuts[i].option, shortcuts[i], kShortcuts[i].text);
   }
-  CLI::Option* out = app.add_option("--out", request.out, "New recording: a folder, or an LCM log (*.lcm, *.log)");
+  app.add_option("--out", request.out, "New recording: a folder, or an LCM log (*.lcm, *.log)");
   app.add_option("--tracks", request.tracks, "Writes the first camera's features as a tracks file");
   app.add_option("--video", request.pictures.video, "Draws the first camera's features (*.mp4, *.avi); needs OpenCV");
   app.add_flag("--rendered", request.pictures.rendered, "With --video: over pictures of the simulated world");
-  app.add_flag("--images", request.pictures.images, "The recording gets pictures of the simulated world")->needs(out);
+  app.add_flag("--images", request.pictures.images, "The recording gets pictures of the simulated world");
   app.add_option("--write-rig", request.rig, "Writes the calibration of the sensors (rig.yaml)");
-  app.add_flag("--live", live, "Publishes on LCM, paced by the time stamps")->excludes(out);
+  app.add_flag("--live", live, "Publishes on LCM, paced by the time stamps");
   app.add_option("--speed", speed, "With --live: 1 as in reality, N times as fast")->capture_default_str();
 
   return program.run(argc, argv, [&] {
@@ -120,6 +120,8 @@ int main(int argc, char** argv) {
     if (live && (!request.tracks.empty() || request.pictures.any())) {
       throw loc::UsageError("--tracks and --video are for recordings, not for --live");
     }
+    if (live && !request.out.empty()) throw loc::UsageError("--out and --live exclude each other");
+    if (request.pictures.images && request.out.empty()) throw loc::UsageError("--images needs --out");
     if (request.pictures.rendered && request.pictures.video.empty()) throw loc::UsageError("--rendered needs --video");
     loc::SimulationPlan plan = loc::plan_simulation(request);
     if (list_all_parameters) {

@@ -181,7 +181,7 @@ ImuMeasurement ImuSimulator::measure(const Motion& motion, TimeNs time_ns) {
   } else {
     input = imu_increment(*last_state_, state, model_.gravity);
   }
-  const ImuMeasurement m = measure(input, time_ns);
+  ImuMeasurement m = measure(input, time_ns);
   last_state_ = state;
   return m;
 }

@@ -82,27 +82,27 @@ struct Simulation::Implementation {
 
   Scenario scenario;
   Rig rig;
-  SimulationOptions options;
-  TimeNs end_ns;
   std::optional<ImuSimulator> imu;
   std::optional<MagnetometerSimulator> magnetometer;
   std::optional<VisualOdometrySimulator> odometry;
   std::optional<GpsSimulator> gps;
-  std::vector<CameraSimulator> cameras;
-  std::vector<Stream> streams;
   MotionState state;
-  TimeNs state_time_ns = kNoTime;
-  std::map<Key, Waiting> waiting;
-  std::int64_t number = 0;
-  TimeNs simulated_ns = 0;
   SimulationTruth truth;
-  Scene world;
   std::optional<FrameTruth> measured_frame;  // of the features that are being put
   FrameTruth frame;
+  Scene world;
+  std::vector<CameraSimulator> cameras;
+  std::vector<Stream> streams;
+  std::map<Key, Waiting> waiting;
+  TimeNs end_ns;
+  TimeNs state_time_ns = kNoTime;
+  TimeNs simulated_ns = 0;
+  std::int64_t number = 0;
+  SimulationOptions options;
 };
 
 Simulation::Implementation::Implementation(const Scenario& given, std::uint64_t seed, const SimulationOptions& opts)
-    : scenario((given.check(), given)), rig(scenario.rig()), options(opts), end_ns(from_seconds(scenario.duration_s)) {
+    : scenario((given.check(), given)), rig(scenario.rig()), end_ns(from_seconds(scenario.duration_s)), options(opts) {
   // All are forked whether their sensors are on or not, so that switching one leaves the others as they were.
   Random root(seed);
   const auto fork = [&](std::uint64_t index) {

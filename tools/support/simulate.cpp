@@ -2,6 +2,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -34,9 +36,9 @@ void choose_streams(Scenario& scenario, const std::string& list) {
     const std::size_t end = std::min(list.find(',', at), list.size());
     const std::string name = list.substr(at, end - at);
     at = end + 1;
-    const std::string all = "imu, magnetometer, odometry, gps, features, reference";
-    if (name.empty() || (", " + all + ",").find(", " + name + ",") == std::string::npos) {
-      throw UsageError("--streams: '" + name + "' is none of " + all);
+    constexpr std::array kAll = {"imu", "magnetometer", "odometry", "gps", "features", "reference"};
+    if (std::find(kAll.begin(), kAll.end(), name) == kAll.end()) {
+      throw UsageError("--streams: '" + name + "' is none of imu, magnetometer, odometry, gps, features, reference");
     }
     set_parameter(scenario, "streams." + name, "true");
   }
