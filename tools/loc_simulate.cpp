@@ -80,12 +80,11 @@ int main(int argc, char** argv) {
   app.add_flag("--list", list, "Tells the scenarios and ends");
   app.add_flag("--parameters", list_all_parameters, "Tells all parameters of the scenario, as they are set, and ends");
   app.add_option("--scenario", request.scenario, "Name of a scenario");
-  CLI::Option* seed_option = app.add_option("--seed", seed, "The same seed gives the same recording")
-                                 ->check(CLI::NonNegativeNumber)
-                                 ->capture_default_str();
+  CLI::Option* seed_option =
+      app.add_option("--seed", seed, "The same seed gives the same recording")->capture_default_str();
   app.add_option("--duration", duration, "60s, 2min; 60 s unless given");
   app.add_option("--config", request.file, "Scenario file: name, seed, duration, parameters")->check(CLI::ExistingFile);
-  app.add_option("--set", settings, "NAME=VALUE, any parameter (--parameters tells them)")->delimiter('\0');
+  app.add_option("--set", settings, "NAME=VALUE, any parameter (--parameters tells them)");
   app.add_option("--streams", request.streams, "imu,magnetometer,odometry,gps,features,reference: these alone");
   for (std::size_t i = 0; i < kShortcuts.size(); ++i) {
     app.add_option(kShortcuts[i].option, shortcuts[i], kShortcuts[i].text);
@@ -104,6 +103,7 @@ int main(int argc, char** argv) {
       list_scenarios();
       return loc::kExitOk;
     }
+    if (seed < 0) throw loc::UsageError("--seed " + std::to_string(seed) + ": must not be negative");
     if (seed_option->count() > 0) request.seed = static_cast<std::uint64_t>(seed);
     if (!duration.empty()) request.duration_s = parse_duration("--duration", duration);
     for (std::size_t i = 0; i < kShortcuts.size(); ++i) {

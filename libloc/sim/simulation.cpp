@@ -80,29 +80,29 @@ struct Simulation::Implementation {
   TimeNs earliest_key(const Stream& stream) const;
   Measurement reference(const StreamTick& tick);
 
-  Scenario scenario;
-  Rig rig;
-  std::optional<ImuSimulator> imu;
-  std::optional<MagnetometerSimulator> magnetometer;
-  std::optional<VisualOdometrySimulator> odometry;
-  std::optional<GpsSimulator> gps;
+  FrameTruth frame;
+  std::optional<FrameTruth> measured_frame;  // of the features that are being put
   MotionState state;
   SimulationTruth truth;
-  std::optional<FrameTruth> measured_frame;  // of the features that are being put
-  FrameTruth frame;
-  Scene world;
-  std::vector<CameraSimulator> cameras;
-  std::vector<Stream> streams;
-  std::map<Key, Waiting> waiting;
+  Scenario scenario;
+  std::optional<VisualOdometrySimulator> odometry;
+  std::optional<ImuSimulator> imu;
   TimeNs end_ns;
   TimeNs state_time_ns = kNoTime;
   TimeNs simulated_ns = 0;
   std::int64_t number = 0;
+  std::vector<CameraSimulator> cameras;
+  std::vector<Stream> streams;
+  std::map<Key, Waiting> waiting;
+  Scene world;
+  Rig rig;
+  std::optional<MagnetometerSimulator> magnetometer;
+  std::optional<GpsSimulator> gps;
   SimulationOptions options;
 };
 
 Simulation::Implementation::Implementation(const Scenario& given, std::uint64_t seed, const SimulationOptions& opts)
-    : scenario((given.check(), given)), rig(scenario.rig()), end_ns(from_seconds(scenario.duration_s)), options(opts) {
+    : scenario((given.check(), given)), end_ns(from_seconds(scenario.duration_s)), rig(scenario.rig()), options(opts) {
   // All are forked whether their sensors are on or not, so that switching one leaves the others as they were.
   Random root(seed);
   const auto fork = [&](std::uint64_t index) {
