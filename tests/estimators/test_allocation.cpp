@@ -6,6 +6,8 @@
 #include <cstdlib>
 #include <new>
 
+#include "libloc/estimators/error_state_filter.hpp"
+#include "libloc/estimators/fusion_preset.hpp"
 #include "libloc/estimators/madgwick.hpp"
 #include "libloc/sensors/clock_gps.hpp"
 #include "libloc/sensors/stream.hpp"
@@ -50,6 +52,35 @@ TEST(Allocation, MadgwickDoesNotAllocatePerSample) {
     ASSERT_TRUE(estimate.q_world_body.coeffs().allFinite());
   }
   EXPECT_EQ(allocations, before);
+}
+
+TEST(Allocation, ErrorStateFilterDoesNotAllocate) {
+  for (const int clones : {0, 2}) {
+    FusionPreset preset = FusionPreset::drift();
+    preset.options.clones = clones;
+    ErrorStateFilter filter(preset.options);
+    filter.start(0, {}, Eigen::MatrixXd::Identity(filter.layout().size, filter.layout().size));
+    const Eigen::Matrix3d cov = 0.01 * Eigen::Matrix3d::Identity();
+    ImuMeasurement imu;
+    imu.angular_velocity = {0.01, 0, 0};
+    imu.specific_force = {0, 0, 9.81};
+    long before = 0;
+    for (int i = 0; i < 2000; ++i) {
+      if (i == 1000) before = allocations;  // by then every queue has been as long as it gets
+      imu.time_ns = i * 10'000'000LL;
+      filter.predict(imu);
+      // In time, between two samples, late, newer than the IMU.
+      filter.fuse_vo(imu.time_ns, Eigen::Vector3d::Zero(), cov, Eigen::Quaterniond::Identity(), cov);
+      filter.fuse_gps(imu.time_ns - 123'456'789, Eigen::Vector3d::Zero(), 100 * cov);
+      filter.fuse_height(imu.time_ns + 3'000'000, 0, 1);
+      if (clones > 0 && i % 10 == 9) {
+        filter.fuse_vo_relative(imu.time_ns - 100'000'000, imu.time_ns, Eigen::Vector3d::Zero(), cov,
+                                Eigen::Quaterniond::Identity(), cov);
+      }
+    }
+    EXPECT_EQ(allocations, before) << clones;
+    EXPECT_TRUE(filter.covariance().allFinite());
+  }
 }
 
 TEST(Allocation, ClocksDoNotAllocate) {
