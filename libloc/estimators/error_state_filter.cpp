@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <exception>
 #include <string>
 #include <utility>
 
@@ -19,7 +20,9 @@ using error_state::Machine;
 
 // One copy of state and covariance for so many IMU samples: a late measurement starts from the last one before it.
 constexpr int kSamplesPerSnapshot = 8;
-constexpr std::size_t kOutcomes = 8;
+constexpr std::size_t kOutcomes = 10;
+// More than any sensor reads: beyond it products overflow.
+constexpr double kMostOfAnImu = 1e6;
 
 // Of measurements that share a time. Where a pose is kept at this time as well, it is the corrected one.
 int rank(const Correction& c) {
@@ -121,6 +124,10 @@ const char* fusion_outcome_name(FusionOutcome outcome) {
       return "no_clone";
     case FusionOutcome::kNotStarted:
       return "not_started";
+    case FusionOutcome::kTooEarly:
+      return "too_early";
+    case FusionOutcome::kModelFailed:
+      return "model_failed";
   }
   return "unknown";
 }
@@ -148,6 +155,12 @@ struct ErrorStateFilter::Implementation {
   std::int64_t imu_not_finite = 0;
   std::int64_t imu_not_increasing = 0;
   std::uint64_t next_id = 1;
+  std::exception_ptr failure;  // of a model, until the call that met it ends
+
+  // Says what a model threw, once the filter is in order again.
+  void say_failure() {
+    if (failure) std::rethrow_exception(std::exchange(failure, nullptr));
+  }
 
   void count(const Correction& c, FusionOutcome outcome, int by = 1) {
     if (!c.keeps_pose) counts[static_cast<std::size_t>(c.source)][static_cast<std::size_t>(outcome)] += by;
@@ -156,7 +169,17 @@ struct ErrorStateFilter::Implementation {
   // Applies the next correction, at the time of the core.
   FusionResult apply_next() {
     Correction& c = corrections[applied++];
-    const FusionResult result = machine.apply(core, c);
+    FusionResult result;
+    result.source = c.source;
+    result.time_ns = c.time_ns;
+    result.outcome = FusionOutcome::kModelFailed;
+    if (c.outcome != FusionOutcome::kModelFailed) {
+      try {
+        result = machine.apply(core, c);
+      } catch (...) {
+        failure = std::current_exception();
+      }
+    }
     if (c.outcome != FusionOutcome::kWaiting) count(c, c.outcome, -1);  // computed anew: the last word counts
     c.outcome = result.outcome;
     count(c, c.outcome);
@@ -220,7 +243,14 @@ struct ErrorStateFilter::Implementation {
 
   bool is_too_late(TimeNs time) const {
     if (time >= core.time_ns) return false;
-    return snapshots.empty() || time < snapshots_begin() || time < core.time_ns - machine.options().history_ns;
+    TimeNs age = 0;
+    if (__builtin_sub_overflow(core.time_ns, time, &age) || age > machine.options().history_ns) return true;
+    return snapshots.empty() || time < snapshots_begin();
+  }
+  bool is_too_early(TimeNs time) const {
+    TimeNs ahead = 0;
+    return time > core.time_ns &&
+           (__builtin_sub_overflow(time, core.time_ns, &ahead) || ahead > machine.options().max_bridge_ns);
   }
   TimeNs snapshots_begin() const { return const_cast<SnapshotQueue&>(snapshots)[0].time_ns; }
 
@@ -232,6 +262,9 @@ struct ErrorStateFilter::Implementation {
     if (!is_started) result.outcome = FusionOutcome::kNotStarted;
     if (result.outcome == FusionOutcome::kAccepted && is_too_late(c.time_ns)) {
       result.outcome = FusionOutcome::kTooLate;
+    }
+    if (result.outcome == FusionOutcome::kAccepted && is_too_early(c.time_ns)) {
+      result.outcome = FusionOutcome::kTooEarly;
     }
     if (result.outcome != FusionOutcome::kAccepted) {
       count(c, result.outcome);
@@ -248,11 +281,8 @@ struct ErrorStateFilter::Implementation {
     if (place < applied || time < core.time_ns) {
       if (place < applied && snapshots.empty()) {
         // Without history the order of equal times is that of arrival.
-        ++applied;
-        Correction& last = corrections[place];
-        result = machine.apply(core, last);
-        last.outcome = result.outcome;
-        count(last, result.outcome);
+        std::swap(corrections[place], corrections[applied]);
+        result = apply_next();
       } else {
         if (time < core.time_ns) ++late;
         compute_anew(time, id, result);
@@ -261,6 +291,7 @@ struct ErrorStateFilter::Implementation {
       apply_due(id, result, false);
     }
     forget_old();
+    say_failure();
     return result;
   }
 };
@@ -270,7 +301,7 @@ ErrorStateFilter::ErrorStateFilter(const ErrorStateOptions& options)
 ErrorStateFilter::ErrorStateFilter(const ErrorStateFilter& other)
     : implementation_(std::make_unique<Implementation>(*other.implementation_)) {}
 ErrorStateFilter& ErrorStateFilter::operator=(const ErrorStateFilter& other) {
-  if (this != &other) *implementation_ = *other.implementation_;
+  if (this != &other) implementation_ = std::make_unique<Implementation>(*other.implementation_);
   return *this;
 }
 ErrorStateFilter::ErrorStateFilter(ErrorStateFilter&&) noexcept = default;
@@ -364,7 +395,9 @@ PredictOutcome ErrorStateFilter::predict(const ImuMeasurement& imu) {
   Implementation& i = *implementation_;
   i.finished.clear();
   if (!i.is_started) return PredictOutcome::kNotStarted;
-  if (!imu.angular_velocity.allFinite() || !imu.specific_force.allFinite() || imu.time_ns == kNoTime) {
+  if (!(imu.angular_velocity.cwiseAbs().maxCoeff() < kMostOfAnImu) ||
+      !(imu.specific_force.cwiseAbs().maxCoeff() < kMostOfAnImu) || imu.angular_velocity.hasNaN() ||
+      imu.specific_force.hasNaN() || imu.time_ns == kNoTime) {
     ++i.imu_not_finite;
     return PredictOutcome::kNotFinite;
   }
@@ -374,8 +407,8 @@ PredictOutcome ErrorStateFilter::predict(const ImuMeasurement& imu) {
     ++i.imu_not_increasing;
     return PredictOutcome::kTimeNotIncreasing;
   }
-  const TimeNs length = imu.time_ns - before;
-  if (length > options().max_bridge_ns) {
+  TimeNs length = 0;
+  if (__builtin_sub_overflow(imu.time_ns, before, &length) || length > options().max_bridge_ns) {
     ++i.gaps;
     return PredictOutcome::kGap;
   }
@@ -403,6 +436,7 @@ PredictOutcome ErrorStateFilter::predict(const ImuMeasurement& imu) {
   FusionResult none;
   i.advance(stored, 0, none, true);
   i.forget_old();
+  i.say_failure();
   return bridged ? PredictOutcome::kBridged : PredictOutcome::kPredicted;
 }
 
@@ -441,7 +475,16 @@ FusionResult ErrorStateFilter::fuse_vo_relative(TimeNs time0_ns, TimeNs time1_ns
       const Correction& other = i.corrections[k];
       kept = other.time_ns == time0_ns && (other.keeps_pose || other.source == FusionSource::kRelativeOdometry);
     }
-    if (!kept && !i.is_too_late(time0_ns)) keep_pose(time0_ns);
+    // Its place must not be one that others, from before time0 to after it, still need.
+    int in_use = 0;
+    for (std::size_t k = 0; k < i.corrections.size(); ++k) {
+      const Correction& other = i.corrections[k];
+      in_use +=
+          other.source == FusionSource::kRelativeOdometry && other.start_time_ns < time0_ns && other.time_ns > time0_ns
+              ? 1
+              : 0;
+    }
+    if (!kept && !i.is_too_late(time0_ns) && in_use < options().clones) keep_pose(time0_ns);
   }
   return i.take(std::move(c));
 }

@@ -111,8 +111,10 @@ enum class FusionOutcome : std::uint8_t {
   kTooLate,        ///< older than the history, or than the start
   kNotFinite,      ///< a number is NaN or infinite, or a quaternion is not of norm 1
   kBadCovariance,  ///< not symmetric and positive definite
-  kNoClone,        ///< relative to a pose that is not kept
-  kNotStarted
+  kNoClone,        ///< relative to a pose that is not kept, or that there is no place for besides others in use
+  kNotStarted,
+  kTooEarly,    ///< further ahead of the newest IMU sample than a step may be long (max_bridge_ns)
+  kModelFailed  ///< the model threw, or gave sizes that do not fit: left out, and said by an exception
 };
 const char* fusion_outcome_name(FusionOutcome outcome);
 
@@ -200,7 +202,9 @@ class ErrorStateFilter {
   FusionResult fuse_height(TimeNs time_ns, double height, double sigma);    ///< [m], z of world
   FusionResult fuse_heading(TimeNs time_ns, double heading, double sigma);  ///< [rad], as so3::heading
 
-  /// Any other measurement. @throws std::invalid_argument when the model's sizes do not fit.
+  /// Any other measurement. @throws std::invalid_argument when the model's sizes do not fit, and what the model throws;
+  /// predict() and later fuse_*() throw it when the measurement waited, or is applied anew. The filter then goes on
+  /// without this measurement.
   FusionResult correct(TimeNs time_ns, MeasurementModel model);
   /// What correct() would find now (residual, S, NIS, whether the gate lets it pass), without applying it.
   FusionResult residual(const MeasurementModel& model) const;

@@ -119,11 +119,11 @@ std::optional<double> FusionStart::magnetic_heading(const Eigen::Quaterniond& le
   return std::atan2(in_world.x(), in_world.y()) - options_.magnetic_declination;
 }
 
-FusionStartEstimate FusionStart::estimate() const {
+FusionStartEstimate FusionStart::estimate(bool may_be_at_rest) const {
   require(over_, "FusionStart: the first samples are not there yet");
   FusionStartEstimate out;
   out.time_ns = samples_.front().time_ns;
-  out.at_rest = look_for_rest();
+  out.at_rest = may_be_at_rest && look_for_rest();
   if (out.at_rest) out.state.gyroscope_bias = mean_rate(samples_);
 
   // Averaged in axes that the gyroscope keeps, so that turning does not smear gravity.

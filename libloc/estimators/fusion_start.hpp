@@ -64,8 +64,9 @@ class FusionStart {
   /// Times that it began anew: a gap, or no gravity in the mean force (free fall).
   std::int64_t repeated() const { return repeated_; }
 
+  /// @param may_be_at_rest false: something else says that the body moves, however calm the IMU is
   /// @throws std::invalid_argument before push() has said that it is over.
-  FusionStartEstimate estimate() const;
+  FusionStartEstimate estimate(bool may_be_at_rest = true) const;
   /// Begins anew.
   void reset();
 

@@ -13,6 +13,7 @@ namespace {
 
 // Samples in a row on another time line that mean: the clock was set back.
 constexpr int kSetBackAfter = 20;
+constexpr double kSurelyMoving = 5;  // deviations
 constexpr std::size_t kMostEarly = 20'000;
 // A heading that is worse than this is none.
 constexpr double kMostHeadingSigma = 0.35;      // [rad]
@@ -182,7 +183,11 @@ bool InertialFusion::process_imu(const ImuMeasurement& imu) {
       skip("imu.skipped.time_not_increasing", kTimeNotIncreasing);
       return false;
     }
+    // Where the world is does not depend on the clock; where the body is by now nobody knows.
+    const std::optional<LocalFrame> world = world_;
     reset();
+    world_ = world;
+    given_used_ = true;
     skip("imu.clock_set_back", kReinitialised);
   }
   refused_in_a_row_ = 0;
@@ -191,7 +196,7 @@ bool InertialFusion::process_imu(const ImuMeasurement& imu) {
 }
 
 bool InertialFusion::collect(const ImuMeasurement& imu) {
-  if (options_.given_start && !carried_) {
+  if (options_.given_start && !carried_ && !given_used_) {
     begin_given(imu);
     return true;
   }
@@ -202,6 +207,8 @@ bool InertialFusion::collect(const ImuMeasurement& imu) {
 
 void InertialFusion::begin_given(const ImuMeasurement& imu) {
   bank_.start(imu.time_ns, options_.given_start->state, options_.given_start->covariance);
+  given_used_ = true;
+  started_in_motion_ = false;
   heading_known_ = follows_odometry_ = true;
   anchored_ = tied_ = world_.has_value();
   run_from(imu.time_ns, {imu});
@@ -285,8 +292,34 @@ void InertialFusion::carry_over(const FusionStartEstimate& start, ErrorStateStat
   }
 }
 
+// Does what came with the first second say that the body moves?
+bool InertialFusion::early_motion() const {
+  const OdometryMeasurement* first = nullptr;
+  for (const Measurement& m : early_) {
+    if (const auto* gps = std::get_if<GpsMeasurement>(&m)) {
+      const double sigma =
+          gps->velocity_cov.hasNaN() ? options_.gps_velocity_sigma : std::sqrt(gps->velocity_cov.diagonal().maxCoeff());
+      if (options_.use_gps && gps->velocity_enu.norm() > kSurelyMoving * std::max(sigma, 0.1)) return true;
+    }
+    const auto* odometry = std::get_if<OdometryMeasurement>(&m);
+    if (odometry == nullptr || !options_.use_odometry || !odometry->position.allFinite()) continue;
+    const double variance = odometry->position_cov.hasNaN() ? square(options_.odometry_position_sigma)
+                                                            : odometry->position_cov.diagonal().maxCoeff();
+    const double sigma = std::sqrt(2 * std::max(variance, 0.0));
+    if (odometry->start_time_ns != kNoTime) {
+      if (odometry->position.norm() > kSurelyMoving * sigma) return true;
+    } else if (first == nullptr) {
+      first = odometry;
+    } else if ((odometry->position - first->position).norm() > kSurelyMoving * sigma) {
+      return true;
+    }
+  }
+  return false;
+}
+
 void InertialFusion::begin() {
-  const FusionStartEstimate start = start_.estimate();
+  const FusionStartEstimate start = start_.estimate(!early_motion());
+  started_in_motion_ = !start.at_rest && !carried_;
   Eigen::MatrixXd covariance;
   ErrorStateState state = first_state(start, covariance);
   if (carried_) {
@@ -395,8 +428,9 @@ Estimate InertialFusion::estimate() const {
     const Eigen::Vector3d up = out.q_world_body.inverse() * Eigen::Vector3d::UnitZ();
     out.covariance.topLeftCorner<3, 3>() += bank_.spread() * up * up.transpose();
   }
+  if (started_in_motion_ && odometry_used_ && !tied_) out.valid &= ~(kValidPosition | kValidVelocity);
   if (layout.scale >= 0 && options_.use_odometry) {
-    out.valid |= kValidScale;
+    if (!(started_in_motion_ && !tied_)) out.valid |= kValidScale;
     out.scale = state.scale;
     out.scale_sigma = std::sqrt(filter.covariance()(layout.scale, layout.scale));
   }

@@ -16,7 +16,9 @@
 // Rejections: a source that is gated reject_count times in a row over reject_time_s is believed again: the covariance
 // is widened by what it says (kRecovered), and if that does not help, the filter starts anew where GPS says.
 //
-// Not observable: heading without GPS motion, magnetometer or absolute odometry; scale without acceleration.
+// Not observable: heading without GPS motion, magnetometer or absolute odometry; scale without acceleration. After a
+// start in motion with odometry alone, velocity and scale can only be found together, which a linearised filter gets
+// wrong: position, velocity and scale are not marked valid then until GPS comes. Start at rest, or give the start.
 #pragma once
 
 #include <deque>
@@ -170,6 +172,8 @@ class InertialFusion {
                Eigen::Vector3d& velocity, Eigen::Matrix3d& velocity_cov);
   void anchor(TimeNs time_ns, const Eigen::Vector3d& position, const Eigen::Matrix3d& position_cov);
   void fuse(const OdometryMeasurement& odometry);
+  void look_for_motion(const OdometryMeasurement& odometry, const Eigen::Matrix3d& position_cov);
+  bool early_motion() const;
   void fuse_absolute(const OdometryMeasurement& odometry, const Eigen::Matrix3d& position_cov,
                      const Eigen::Matrix3d& orientation_cov);
   void fuse_as_relative(const OdometryMeasurement& odometry, const Eigen::Matrix3d& position_cov,
@@ -198,6 +202,10 @@ class InertialFusion {
   Eigen::Vector3d odometry_origin_ = Eigen::Vector3d::Zero();  // where our origin is in the odometry's world
   bool odometry_left_world_ = false;                           // it was rejected as an absolute one
   TimeNs rest_fused_ns_ = kNoTime;
+  bool given_used_ = false;
+  bool started_in_motion_ = false;  // and nothing has said since how long a metre of the odometry is
+  bool odometry_used_ = false;
+  OdometryMeasurement seen_;        // absolute pose that motion is looked for against
   TimeNs gps_before_ns_ = kNoTime;  // of the fix before this one
 
   Stamp last_;

@@ -14,15 +14,25 @@ constexpr int kToldAfter = 3;  // rejections in a row
 // So little is known of what is not measured that nothing follows from it, however often it is said. [m^2], [rad^2]
 constexpr int kFixesToDoubt = 3;  // rejections of GPS in a row
 constexpr double kNothing = 1e8;
-constexpr double kOldestAnchor = 1;     // [s]
-constexpr double kScaleDoubt = 0.3;     // of the scale, when the odometry is not believed any more
-constexpr double kAttitudeDoubt = 0.1;  // [rad]
+constexpr double kMostVariance = 1e14;
+constexpr double kOldestAnchor = 1;        // [s]
+constexpr double kApartToSeeMotion = 0.5;  // between two poses [s]
+constexpr double kSeesMotion = 5;          // deviations
+constexpr double kScaleDoubt = 0.3;        // of the scale, when the odometry is not believed any more
+constexpr double kAttitudeDoubt = 0.1;     // [rad]
 
 double square(double x) {
   return x * x;
 }
 
 // Adds what the horizontal (and vertical) variances lack.
+// Symmetric, positive definite, and small enough to reckon with.
+bool usable(const Eigen::Matrix3d& cov) {
+  return cov.allFinite() && cov.cwiseAbs().maxCoeff() < kMostVariance &&
+         (cov - cov.transpose()).isZero(1e-6 * cov.norm()) && cov.diagonal().minCoeff() > 0 &&
+         cov.llt().info() == Eigen::Success;
+}
+
 void raise(Eigen::Matrix3d& cov, double sigma_floor, double vertical_factor) {
   const double horizontal = square(sigma_floor) - 0.5 * (cov(0, 0) + cov(1, 1));
   const double vertical = square(sigma_floor * vertical_factor) - cov(2, 2);
@@ -56,7 +66,7 @@ bool InertialFusion::prepare(const GpsMeasurement& gps, Eigen::Vector3d& positio
   TimeNs ahead = 0;
   if (gps.time_ns == kNoTime || __builtin_sub_overflow(gps.time_ns, filter().time_ns(), &ahead) ||
       to_seconds(ahead) > options_.gps_max_ahead_s) {
-    ++counts_["gps.skipped.ahead"];
+    skip("gps.skipped.ahead", kOutOfRange);
     return false;
   }
   const bool has_height = std::isfinite(gps.altitude);
@@ -82,19 +92,21 @@ bool InertialFusion::prepare(const GpsMeasurement& gps, Eigen::Vector3d& positio
         Eigen::Vector3d(square(sigma), square(sigma), square(sigma * options_.gps_vertical_factor)).asDiagonal();
   }
   // The first fix becomes the state, so that the filter cannot judge it.
-  if (!position_cov.allFinite() || !(position_cov - position_cov.transpose()).isZero(1e-6 * position_cov.norm()) ||
-      position_cov.llt().info() != Eigen::Success) {
+  if (!usable(position_cov)) {
     skip("gps.bad_covariance", kBadCovariance);
     return false;
   }
   position_cov = (turn * position_cov * turn.transpose()).eval();
   raise(position_cov, gps.fix < GpsFixType::kFloat ? options_.gps_sigma_floor : 0, options_.gps_vertical_factor);
-  // While the heading is looked for, and for the fix that the state begins with, one error is as good as another.
-  if (options_.gps_correlation_time_s > 0 && gps.fix < GpsFixType::kFloat && heading_known_ &&
-      gps_before_ns_ != kNoTime) {
+  // The fix that the state begins with says all that one can say.
+  if (options_.gps_correlation_time_s > 0 && gps.fix < GpsFixType::kFloat && gps_before_ns_ != kNoTime) {
     const double apart = std::abs(to_seconds(gps.time_ns - gps_before_ns_));
+    if (apart == 0) {
+      ++counts_["gps.skipped.repeated"];
+      return false;
+    }
     const double phi = std::exp(-apart / options_.gps_correlation_time_s);
-    if (phi < 1) position_cov *= (1 + phi) / (1 - phi);
+    position_cov *= (1 + phi) / (1 - phi);
   }
   const Eigen::Vector3d way = options_.gps_time_sigma * filter().state().inertial.velocity;
   if (heading_known_) {
@@ -178,7 +190,7 @@ void InertialFusion::fuse(const OdometryMeasurement& odometry) {
   TimeNs ahead = 0;
   if (odometry.time_ns == kNoTime || __builtin_sub_overflow(odometry.time_ns, filter().time_ns(), &ahead) ||
       to_seconds(ahead) > options_.gps_max_ahead_s) {
-    ++counts_["odometry.skipped.ahead"];
+    skip("odometry.skipped.ahead", kOutOfRange);
     return;
   }
   if (!odometry.position.allFinite() || odometry.rotation.coeffs().array().isInf().any()) {
@@ -193,6 +205,11 @@ void InertialFusion::fuse(const OdometryMeasurement& odometry) {
       chosen(options_.odometry_position_cov, odometry.position_cov, options_.odometry_position_sigma);
   const Eigen::Matrix3d orientation_cov =
       chosen(options_.odometry_orientation_cov, odometry.orientation_cov, options_.odometry_orientation_sigma);
+  if (!usable(position_cov) || !usable(orientation_cov)) {
+    skip("odometry.bad_covariance", kBadCovariance);
+    return;
+  }
+  look_for_motion(odometry, position_cov);
   const bool clones = options_.filter.clones > 0;
   if (odometry.start_time_ns != kNoTime) {
     if (!clones || odometry.start_time_ns >= odometry.time_ns || odometry.rotation.coeffs().hasNaN()) {
@@ -216,6 +233,24 @@ void InertialFusion::fuse(const OdometryMeasurement& odometry) {
   } else {
     fuse_absolute(odometry, position_cov, orientation_cov);
   }
+}
+
+// Whatever its unit, odometry that moves says that the body is not at rest.
+void InertialFusion::look_for_motion(const OdometryMeasurement& odometry, const Eigen::Matrix3d& position_cov) {
+  odometry_used_ = true;
+  const bool relative = odometry.start_time_ns != kNoTime;
+  const TimeNs from = relative ? odometry.start_time_ns : seen_.time_ns;
+  if (from == kNoTime) {
+    seen_ = odometry;
+    return;
+  }
+  const double apart = to_seconds(odometry.time_ns - from);
+  if (!(apart >= (relative ? 0 : kApartToSeeMotion))) return;
+  const Eigen::Vector3d way = relative ? odometry.position : Eigen::Vector3d(odometry.position - seen_.position);
+  const double sigma = std::sqrt((relative ? 1 : 2) * position_cov.diagonal().maxCoeff());
+  const double unit = std::max(std::abs(filter().state().scale), 1e-3) * apart;
+  if (apart > 0 && way.norm() > kSeesMotion * sigma) rest_.confirm_speed(way.norm() / unit, 0);
+  if (!relative) seen_ = odometry;
 }
 
 void InertialFusion::fuse_absolute(const OdometryMeasurement& odometry, const Eigen::Matrix3d& position_cov,
@@ -296,6 +331,9 @@ void InertialFusion::take_note(const FusionResult& result) {
   switch (result.outcome) {
     case FusionOutcome::kTooLate:
       next_status_ |= kTooLate;
+      return;
+    case FusionOutcome::kNoClone:
+      next_status_ |= kOdometryRejected;
       return;
     case FusionOutcome::kNotFinite:
       next_status_ |= kNotFinite;

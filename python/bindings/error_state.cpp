@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -343,6 +344,8 @@ void bind_results(py::module_& m) {
       .value("BAD_COVARIANCE", FusionOutcome::kBadCovariance)
       .value("NO_CLONE", FusionOutcome::kNoClone)
       .value("NOT_STARTED", FusionOutcome::kNotStarted)
+      .value("TOO_EARLY", FusionOutcome::kTooEarly)
+      .value("MODEL_FAILED", FusionOutcome::kModelFailed)
       .finalize();
   py::class_<FusionResult>(m, "FusionResult", "What became of a measurement, and why.")
       .def_property_readonly("source",
@@ -370,6 +373,35 @@ void bind_results(py::module_& m) {
       .def_readonly("odometry_outcome", &R::odometry_outcome, "FusionOutcome; WAITING: newer than the last IMU sample.")
       .def_readonly("gps_nis", &R::gps_nis)
       .def_readonly("gps_outcome", &R::gps_outcome);
+}
+
+/// A function of Python as a model; run() works without the GIL, hence the lock.
+loc::MeasurementModel model_of(const py::function& model) {
+  // Released under the GIL too, wherever the filter drops it.
+  const std::shared_ptr<py::function> held(new py::function(model), [](py::function* f) {
+    const py::gil_scoped_acquire gil;
+    delete f;
+  });
+  return [held](const ErrorStateState& x, const loc::ErrorStateLayout& layout, loc::Linearisation& out) {
+    const py::gil_scoped_acquire gil;
+    py::dict state;
+    state["q_world_body_wxyz"] = to_wxyz(x.inertial.q_world_body);
+    state["position"] = to_array(x.inertial.position);
+    state["velocity"] = to_array(x.inertial.velocity);
+    state["gyroscope_bias"] = to_array(x.inertial.gyroscope_bias);
+    state["accelerometer_bias"] = to_array(x.inertial.accelerometer_bias);
+    state["scale"] = x.scale;
+    state["drift"] = to_array(x.drift);
+    const auto given = (*held)(state).cast<py::tuple>();
+    if (given.size() != 3) throw py::value_error("the model must give (residual, jacobian, noise_cov)");
+    const py::array_t<double> residual = numbers(given[0].cast<ArrayLike>(), "residual");
+    if (residual.ndim() != 1 || residual.size() < 1 || residual.size() > FusionResult::kMaxDim) {
+      throw py::value_error("the model's residual must be (d,) with d from 1 to 6");
+    }
+    out.residual = Eigen::Map<const Eigen::VectorXd>(residual.data(), residual.size());
+    out.jacobian = matrix(given[1].cast<ArrayLike>(), "jacobian", residual.size(), layout.size);
+    out.noise_cov = matrix(given[2].cast<ArrayLike>(), "noise_cov", residual.size(), residual.size());
+  };
 }
 
 void bind_filter(py::module_& m) {
@@ -473,6 +505,27 @@ void bind_filter(py::module_& m) {
         return self.idle().fuse_heading(time_ns, heading, sigma);
       },
       py::arg("time_ns"), py::arg("heading"), py::arg("sigma"), "[rad]");
+  c.def(
+      "correct",
+      [](PyErrorState& self, loc::TimeNs time_ns, const py::function& model) {
+        return self.idle().correct(time_ns, model_of(model));
+      },
+      py::arg("time_ns"), py::arg("model"),
+      "A measurement of one's own: model(state) gives (residual, jacobian, noise_cov), shapes (d,), (d, n), (d, d), "
+      "d <= 6; state is a dict of arrays: q_world_body_wxyz, position, velocity, gyroscope_bias, accelerometer_bias, "
+      "scale, drift. It is called again when history is computed anew.");
+  c.def(
+      "residual", [](PyErrorState& self, const py::function& model) { return self.idle().residual(model_of(model)); },
+      py::arg("model"), "What correct() would find now, without applying it.");
+  c.def(
+      "widen",
+      [](PyErrorState& self, const ArrayLike& variances) {
+        const py::array_t<double> values = numbers(variances, "variances");
+        if (values.ndim() != 1) throw py::value_error("variances must be (n,)");
+        self.idle().widen(Eigen::Map<const Eigen::VectorXd>(values.data(), values.size()));
+      },
+      py::arg("variances"),
+      "Adds to the variances of the error state, (n,): a filter that rejects everything listens.");
   c.def(
       "run",
       [](PyErrorState& self, const TimeArray& times, const FloatArray& gyro, const FloatArray& force,

@@ -587,6 +587,77 @@ TEST(ErrorStateFilter, WidenedItListensAgain) {
   EXPECT_THROW(filter.widen(-variances), std::invalid_argument);
 }
 
+// What a model throws reaches the caller, and the filter goes on without that measurement.
+TEST(ErrorStateFilter, AModelThatThrowsLeavesTheFilterInOrder) {
+  ErrorStateFilter filter = started(options());
+  ErrorStateFilter without = started(options());
+  Random random(5);
+  Random again(5);
+  int calls = 0;
+  const MeasurementModel model = [&calls](const ErrorStateState&, const ErrorStateLayout& layout, Linearisation& l) {
+    if (++calls == 2) throw std::runtime_error("no more");
+    l.residual = Eigen::VectorXd::Zero(1);
+    l.jacobian = Eigen::MatrixXd::Zero(1, layout.size);
+    l.jacobian(0, kPosition) = 1;
+    l.noise_cov = Eigen::MatrixXd::Constant(1, 1, 100);
+  };
+  for (int i = 0; i <= 100; ++i) {
+    filter.predict(imu_at(i * kStep));
+    without.predict(imu_at(i * kStep));
+    if (i != 70) continue;
+    EXPECT_TRUE(filter.correct(70 * kStep, model).accepted());
+  }
+  // A late fix computes it anew, and the model throws this time.
+  EXPECT_THROW(fuse_gps(filter, 60 * kStep, random), std::runtime_error);
+  EXPECT_TRUE(fuse_gps(without, 60 * kStep, again).accepted());
+  EXPECT_EQ(filter.time_ns(), 100 * kStep);
+  expect_same(filter, without, 1e-12);
+  EXPECT_TRUE(fuse_gps(filter, 65 * kStep, random).accepted());
+  EXPECT_TRUE(fuse_gps(without, 65 * kStep, again).accepted());
+  expect_same(filter, without, 1e-12);
+}
+
+TEST(ErrorStateFilter, TimesAndValuesWithoutEndAreRefused) {
+  ErrorStateFilter filter(options());
+  constexpr TimeNs kFar = std::numeric_limits<TimeNs>::max() - 5;
+  filter.start(-kFar, {}, start_cov(filter.layout()));
+  ImuMeasurement imu = imu_at(0);
+  imu.time_ns = kFar;
+  EXPECT_EQ(filter.predict(imu), PredictOutcome::kGap);
+  Random random(1);
+  EXPECT_EQ(fuse_gps(filter, kFar, random).outcome, FusionOutcome::kTooEarly);
+  imu.time_ns = -kFar + 1;
+  imu.specific_force.x() = 1e300;
+  EXPECT_EQ(filter.predict(imu), PredictOutcome::kNotFinite);
+  EXPECT_TRUE(filter.state().inertial.position.allFinite());
+  ErrorStateFilter moved = std::move(filter);
+  filter = moved;  // a moved-from one can be assigned to
+  EXPECT_EQ(filter.time_ns(), -kFar);
+}
+
+// Two that overlap need two places: the second must not take the first one's away.
+TEST(ErrorStateClones, WhatOverlapsIsRefusedAndNotRevoked) {
+  ErrorStateOptions o = options();
+  o.clones = 1;
+  ErrorStateFilter filter = started(o);
+  for (int i = 0; i <= 30; ++i) filter.predict(imu_at(i * kStep));
+  const auto fuse = [&](int from, int to) {
+    const Truth a = truth_at(to_seconds(from * kStep));
+    const Truth b = truth_at(to_seconds(to * kStep));
+    return filter
+        .fuse_vo_relative(from * kStep, to * kStep, a.q.conjugate() * (b.p - a.p), sigma3(0.02), a.q.conjugate() * b.q,
+                          sigma3(0.01))
+        .outcome;
+  };
+  EXPECT_EQ(fuse(0, 20), FusionOutcome::kAccepted);
+  EXPECT_EQ(fuse(10, 30), FusionOutcome::kNoClone);
+  for (const NamedCount& count : filter.counts()) {
+    if (count.name.starts_with("relative")) {
+      EXPECT_EQ(count.value, 1) << count.name;
+    }
+  }
+}
+
 // An hour of everything at once leaves a covariance that is still one.
 TEST(ErrorStateFilter, TheCovarianceStaysPositive) {
   ErrorStateOptions o = late_options();

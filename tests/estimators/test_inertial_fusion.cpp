@@ -179,6 +179,49 @@ TEST(InertialFusion, StartsInMotion) {
   }
 }
 
+// Velocity and scale can only be found together then, and a filter that linearises gets them wrong: not valid.
+TEST(InertialFusion, AStartInMotionWithOdometryAloneIsNotTrusted) {
+  Drive d;
+  d.motion = car();
+  d.gps = false;
+  d.odometry = true;
+  d.duration_s = 20;
+  d.run(1);
+  EXPECT_NE(d.estimates.back().valid & kValidScale, 0U) << "from rest";
+  d = Drive{};
+  d.motion = car();
+  d.motion.rest_s = -10;
+  d.gps = false;
+  d.odometry = true;
+  d.duration_s = 20;
+  d.run(1);
+  EXPECT_EQ(d.estimates.back().valid & (kValidScale | kValidPosition | kValidVelocity), 0U);
+  EXPECT_EQ(d.statuses & kAtRest, 0U);
+}
+
+TEST(InertialFusion, OdometryThatKnowsNoCovarianceIsRefused) {
+  for (const double wrong : {-1.0, 1e308}) {
+    Drive d;
+    d.motion = car();
+    d.gps = false;
+    d.odometry = true;
+    d.duration_s = 10;
+    d.change_odometry = [=](OdometryMeasurement& o, double) {
+      o.orientation_cov = wrong * Eigen::Matrix3d::Identity();
+      return true;
+    };
+    std::int64_t refused = 0;
+    d.look = [&](const InertialFusion& fusion, const Estimate&, double) {
+      for (const NamedCount& count : fusion.counts()) {
+        if (count.name == "odometry.bad_covariance") refused = count.value;
+      }
+    };
+    d.run(1);
+    EXPECT_GT(refused, 50);
+    EXPECT_NE(d.statuses & kBadCovariance, 0U);
+  }
+}
+
 TEST(InertialFusion, LeverArmAndLatencyAreTakenIntoAccount) {
   for (const double latency : {0.0, 0.25}) {
     Drive d;

@@ -205,3 +205,26 @@ def test_mistakes_are_named() -> None:
     with pytest.raises(ValueError, match="clones"):
         filter_.fuse_vo_relative(0, 1, [0, 0, 0], np.eye(3), [1, 0, 0, 0], np.eye(3))
     assert filter_.predict(0, [np.nan, 0, 0], [0, 0, 9.81]) == libloc.PredictOutcome.NOT_FINITE
+
+
+def test_a_model_of_ones_own() -> None:
+    filter_ = started()
+    filter_.predict(0, [0, 0, 0], [0, 0, 9.81])
+
+    def speed_is_one(state: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        jacobian = np.zeros((1, 16))
+        jacobian[0, 6] = 1
+        return np.array([1 - state["velocity"][0]]), jacobian, np.array([[1e-4]])
+
+    foreseen = filter_.residual(speed_is_one)
+    assert filter_.velocity[0] == 0
+    done = filter_.correct(0, speed_is_one)
+    assert done.accepted and done.nis == foreseen.nis == pytest.approx(1 / (0.01 + 1e-4))
+    assert filter_.velocity[0] == pytest.approx(0.01 / (0.01 + 1e-4))
+    with pytest.raises(ValueError, match="jacobian"):
+        filter_.correct(0, lambda state: (np.zeros(1), np.zeros((1, 15)), np.eye(1)))
+    with pytest.raises(ZeroDivisionError):
+        filter_.correct(0, lambda state: 1 / 0)
+    variances = filter_.covariance.diagonal().copy()
+    filter_.widen(np.ones(16))
+    np.testing.assert_allclose(filter_.covariance.diagonal(), variances + 1)
