@@ -1767,9 +1767,11 @@ class FusionOutcome(enum.IntEnum):
     ACCEPTED: typing.ClassVar[FusionOutcome]
     BAD_COVARIANCE: typing.ClassVar[FusionOutcome]
     GATED: typing.ClassVar[FusionOutcome]
+    MODEL_FAILED: typing.ClassVar[FusionOutcome]
     NOT_FINITE: typing.ClassVar[FusionOutcome]
     NOT_STARTED: typing.ClassVar[FusionOutcome]
     NO_CLONE: typing.ClassVar[FusionOutcome]
+    TOO_EARLY: typing.ClassVar[FusionOutcome]
     TOO_LATE: typing.ClassVar[FusionOutcome]
     WAITING: typing.ClassVar[FusionOutcome]
     @classmethod
@@ -1881,6 +1883,10 @@ class ErrorStateFilter:
     """
     def __init__(self, options: ErrorStateOptions | None = None) -> None:
         ...
+    def correct(self, time_ns: typing.SupportsInt | typing.SupportsIndex, model: collections.abc.Callable) -> FusionResult:
+        """
+        A measurement of one's own: model(state) gives (residual, jacobian, noise_cov), shapes (d,), (d, n), (d, d), d <= 6; state is a dict of arrays: q_world_body_wxyz, position, velocity, gyroscope_bias, accelerometer_bias, scale, drift. It is called again when history is computed anew.
+        """
     def counts(self) -> dict[str, int]:
         """
         {name: number}
@@ -1917,6 +1923,10 @@ class ErrorStateFilter:
         """
         The next IMU sample [rad/s], [m/s^2].
         """
+    def residual(self, model: collections.abc.Callable) -> FusionResult:
+        """
+        What correct() would find now, without applying it.
+        """
     def run(self, times_ns: numpy.typing.NDArray[numpy.int64], gyro: numpy.typing.NDArray[numpy.float64], force: numpy.typing.NDArray[numpy.float64], *, odometry_times_ns: numpy.typing.NDArray[numpy.int64] | None = None, odometry_position: numpy.typing.NDArray[numpy.float64] | None = None, odometry_position_cov: numpy.typing.NDArray[numpy.float64] | None = None, odometry_wxyz: numpy.typing.NDArray[numpy.float64] | None = None, odometry_orientation_cov: numpy.typing.NDArray[numpy.float64] | None = None, odometry_arrivals_ns: numpy.typing.NDArray[numpy.int64] | None = None, odometry_start_times_ns: numpy.typing.NDArray[numpy.int64] | None = None, gps_times_ns: numpy.typing.NDArray[numpy.int64] | None = None, gps_position: numpy.typing.NDArray[numpy.float64] | None = None, gps_position_cov: numpy.typing.NDArray[numpy.float64] | None = None, gps_arrivals_ns: numpy.typing.NDArray[numpy.int64] | None = None, antenna: numpy.typing.ArrayLike = [0.0, 0.0, 0.0], with_covariance: bool = False) -> ErrorStateRun:
         """
         A whole recording in one call, without the GIL and without copies of the input.
@@ -1926,6 +1936,10 @@ class ErrorStateFilter:
     def start(self, time_ns: typing.SupportsInt | typing.SupportsIndex, covariance: numpy.typing.ArrayLike, q_world_body_wxyz: numpy.typing.ArrayLike = [1.0, 0.0, 0.0, 0.0], position: numpy.typing.ArrayLike = [0.0, 0.0, 0.0], velocity: numpy.typing.ArrayLike = [0.0, 0.0, 0.0], gyroscope_bias: numpy.typing.ArrayLike = [0.0, 0.0, 0.0], accelerometer_bias: numpy.typing.ArrayLike = [0.0, 0.0, 0.0], scale: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         """
         Starts, or starts anew. covariance (n, n) of the error state; ValueError unless symmetric and positive semidefinite.
+        """
+    def widen(self, variances: numpy.typing.ArrayLike) -> None:
+        """
+        Adds to the variances of the error state, (n,): a filter that rejects everything listens.
         """
     @property
     def T_body_odometry(self) -> Pose3:
