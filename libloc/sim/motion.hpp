@@ -1,8 +1,7 @@
 // True motion of a body: what the simulated sensors measure, without any noise. Every quantity is analytic (no finite
 // differences) and belongs to one curve: velocity is the derivative of position, angular velocity that of the attitude.
-// All are continuous in time, but for motions through way-points (waypoint_motion.hpp), whose acceleration and rates may
-// jump there.
-// Frames: world is ENU (z up), body is whatever the motion says (vehicles: x forward, y left, z up).
+// All are continuous in time, but for motions through way-points (waypoint_motion.hpp), whose acceleration and rates
+// may jump there. Frames: world is ENU (z up), body is whatever the motion says (vehicles: x forward, y left, z up).
 #pragma once
 
 #include <Eigen/Core>
