@@ -562,6 +562,69 @@ TEST(InertialFusion, AClockThatIsSetBackIsANewStart) {
   EXPECT_EQ(fusion.estimate().time_ns, motion.time(5.99));
 }
 
+// Where the world is does not depend on a clock, and a given start is given for one time only.
+TEST(InertialFusion, AClockThatIsSetBackKeepsTheOriginAndDoesNotRepeatAGivenStart) {
+  for (const bool given : {false, true}) {
+    Drive d;
+    d.motion = car();
+    if (given) {
+      ErrorStateState state;
+      state.inertial.q_world_body = d.motion.at(0).T_world_body.rotation;
+      const int size = ErrorStateFilter(d.options.filter).layout().size;
+      d.options.given_start = GivenStart{state, 1e-2 * Eigen::MatrixXd::Identity(size, size)};
+    }
+    const auto set_back = [&](Stamp& stamp, double t) {
+      if (t >= 30) stamp.time_ns -= from_seconds(5);
+      return true;
+    };
+    d.change_imu = set_back;
+    d.change_gps = set_back;
+    std::optional<GeodeticPoint> before;
+    std::optional<Estimate> first_after;
+    d.look = [&](const InertialFusion& fusion, const Estimate& e, double t) {
+      if (t < 30) {
+        before = fusion.world()->origin();
+      } else if (!first_after) {
+        first_after = e;
+      }
+    };
+    d.run();
+    EXPECT_EQ(count(d.fusion->counts(), "imu.clock_set_back"), 1);
+    ASSERT_TRUE(before && first_after && d.fusion->world());
+    EXPECT_EQ(d.fusion->world()->origin().latitude, before->latitude);
+    EXPECT_EQ(d.fusion->world()->origin().longitude, before->longitude);
+    // It says that it does not know where the body is by now, or it knows.
+    Estimate last = d.estimates.back();
+    last.time_ns += from_seconds(5);
+    EXPECT_LT(d.position_error(last).norm(), 6) << given;
+  }
+}
+
+// Errors that last do not average out, whether the heading is known or not, and a fix sent twice tells nothing new.
+TEST(InertialFusion, FixesWhoseErrorsLastAreNotAveragedAway) {
+  for (const bool twice : {false, true}) {
+    Drive d;
+    d.motion = car();
+    d.motion.rest_s = 1000;
+    d.duration_s = 120;
+    d.options.gps_correlation_time_s = 60;
+    const Eigen::Vector3d lasting(1.5, -1.2, 0);
+    d.gps_sigma = 0.3;
+    d.change_gps = [&](GpsMeasurement& fix, double) {
+      const LocalFrame& w = d.world;
+      const GeodeticPoint moved = w.to_geodetic(w.to_local({fix.latitude, fix.longitude, fix.altitude}) + lasting);
+      fix.latitude = moved.latitude;
+      fix.longitude = moved.longitude;
+      fix.position_cov = Eigen::Vector3d(1.5, 1.5, 9).cwiseAbs2().asDiagonal();
+      if (twice) d.fusion->process(fix);
+      return true;
+    };
+    d.run();
+    EXPECT_GT(std::sqrt(d.estimates.back().covariance(kPosition, kPosition)), 0.7) << twice;
+    EXPECT_EQ(count(d.fusion->counts(), "gps.skipped.repeated") > 50, twice);
+  }
+}
+
 TEST(InertialFusion, GpsThatReallyMovedIsBelievedInTheEnd) {
   Drive d;
   d.motion = car();
