@@ -128,7 +128,7 @@ FusionResult Machine::apply(Core& core, const Correction& correction) {
     result.outcome = FusionOutcome::kAccepted;
     return result;
   }
-  const FusionResult result = examine(core, correction);
+  FusionResult result = examine(core, correction);
   if (result.accepted()) {
     joseph_update(core.covariance, observation_, innovation_, correction_);
     inject(core);

@@ -8,10 +8,12 @@
 namespace loc {
 namespace {
 
+constexpr int kStrip = 16;  // rows at a time, of sizes that the compiler does not know
+
 // P F^T for some rows of P: each row by itself. Only the first nine columns change.
 template <int kRows, class Rows>
 void propagate_rows(Rows p, const InertialJacobian& f, double half) {
-  constexpr int kMaxRows = kRows == Eigen::Dynamic ? 16 : kRows;
+  constexpr int kMaxRows = kRows == Eigen::Dynamic ? kStrip : kRows;
   using Columns = Eigen::Matrix<double, kRows, 3, 0, kMaxRows, 3>;
   const auto theta = p.template middleCols<3>(kTheta);
   Columns pull = theta.lazyProduct(f.velocity_theta.transpose());
@@ -33,8 +35,8 @@ void propagate_sized(Eigen::MatrixXd& covariance, const InertialJacobian& f) {
   const double half = f.position_from_attitude ? 0.5 * dt : 0.0;
 
   if constexpr (kRows == Eigen::Dynamic) {
-    for (Eigen::Index row = 0; row < n; row += 16) {
-      propagate_rows<Eigen::Dynamic>(p.middleRows(row, std::min<Eigen::Index>(16, n - row)), f, half);
+    for (Eigen::Index row = 0; row < n; row += kStrip) {
+      propagate_rows<Eigen::Dynamic>(p.middleRows(row, std::min<Eigen::Index>(kStrip, n - row)), f, half);
     }
   } else {
     propagate_rows<kRows>(p.template topRows<kRows>(), f, half);
