@@ -196,6 +196,36 @@ TEST(ErrorStateFilter, MountedOdometryAndAntenna) {
   EXPECT_LT((found.translation - mount.translation).norm(), 0.05);
 }
 
+// What one step adds, exactly: densities, the drift's decay and its noise, the walk of the scale.
+TEST(ErrorStateFilter, NoiseOfAStep) {
+  ErrorStateOptions o = options();
+  o.estimate_drift = true;
+  o.drift_sigma = 2;
+  o.drift_time_constant_s = 0.5;
+  o.scale_random_walk = 0.3;
+  ErrorStateFilter filter(o);
+  const ErrorStateLayout& layout = filter.layout();
+  ErrorStateState state;
+  state.scale = 2;
+  state.drift = {1, 2, 3};
+  filter.start(0, state, Eigen::MatrixXd::Zero(layout.size, layout.size));
+  ImuMeasurement imu;
+  imu.time_ns = kStep;
+  imu.angular_velocity.setZero();
+  imu.specific_force = -kGravity;
+  filter.predict(imu);
+  const double dt = 0.01;
+  const double phi = std::exp(-dt / 0.5);
+  const auto variance = [&](int at) { return filter.covariance()(at, at); };
+  EXPECT_NEAR(variance(kTheta), std::pow(o.noise.gyroscope_noise_density, 2) * dt, 1e-18);
+  EXPECT_NEAR(variance(kVelocity), std::pow(o.noise.accelerometer_noise_density, 2) * dt, 1e-16);
+  EXPECT_NEAR(variance(kGyroscopeBias), std::pow(o.noise.gyroscope_random_walk, 2) * dt, 1e-18);
+  EXPECT_NEAR(variance(kAccelerometerBias), std::pow(o.noise.accelerometer_random_walk, 2) * dt, 1e-16);
+  EXPECT_NEAR(variance(layout.scale), std::pow(0.3 * 2, 2) * dt, 1e-12);
+  EXPECT_NEAR(variance(layout.drift), 4 * (1 - phi * phi), 1e-12);
+  EXPECT_NEAR(filter.state().drift.z(), 3 * phi, 1e-12);
+}
+
 // ---- order of arrival
 
 ErrorStateOptions late_options() {
