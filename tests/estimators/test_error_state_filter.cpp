@@ -226,6 +226,29 @@ TEST(ErrorStateFilter, NoiseOfAStep) {
   EXPECT_NEAR(filter.state().drift.z(), 3 * phi, 1e-12);
 }
 
+// A rate that grows evenly: split anywhere, the step integrates the same line; with Euler's steps the same way round.
+TEST(ErrorStateFilter, SplitStepsAndEulersFollowTheSameTurn) {
+  const Eigen::Vector3d axis = Eigen::Vector3d(1, -2, 3).normalized();
+  const auto turned = [&](ImuIntegration integration, TimeNs split) {
+    ErrorStateOptions o = options();
+    o.integration = integration;
+    ErrorStateFilter filter(o);
+    filter.start(0, {}, start_cov(filter.layout()));
+    ImuMeasurement imu;
+    imu.specific_force = -kGravity;
+    for (imu.time_ns = 0; imu.time_ns <= 10 * kStep; imu.time_ns += kStep) {
+      imu.angular_velocity = 10 * to_seconds(imu.time_ns) * axis;
+      if (split > 0) filter.fuse_height(imu.time_ns + split, 0, 1e6);
+      filter.predict(imu);
+    }
+    return Eigen::Vector3d(so3::log(filter.state().inertial.q_world_body));
+  };
+  const Eigen::Vector3d exact = 0.5 * 10 * 0.01 * axis;  // 0.1 s
+  EXPECT_TRUE(test::near(turned(ImuIntegration::kMidpoint, 0), exact, 1e-12));
+  EXPECT_TRUE(test::near(turned(ImuIntegration::kMidpoint, kStep / 4), exact, 1e-9));
+  EXPECT_TRUE(test::near(turned(ImuIntegration::kEuler, 0), exact, 0.006));  // it takes the rate at the step's end
+}
+
 // ---- order of arrival
 
 ErrorStateOptions late_options() {
