@@ -34,5 +34,6 @@ write_basic_package_version_file("${PROJECT_BINARY_DIR}/liblocConfigVersion.cmak
 install(FILES
   "${PROJECT_BINARY_DIR}/liblocConfig.cmake" "${PROJECT_BINARY_DIR}/liblocConfigVersion.cmake"
   "${CMAKE_CURRENT_LIST_DIR}/FindGeographicLib.cmake" "${CMAKE_CURRENT_LIST_DIR}/FindLCM.cmake"
+  "${CMAKE_CURRENT_LIST_DIR}/FindOpenBLAS.cmake"
   "${CMAKE_CURRENT_LIST_DIR}/FindMatio.cmake" "${CMAKE_CURRENT_LIST_DIR}/FindOpenCV.cmake"
   DESTINATION "${loc_package_dir}" COMPONENT development)

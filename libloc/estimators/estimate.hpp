@@ -43,6 +43,9 @@ enum EstimateStatus : std::uint32_t {
   kRecovered = 1U << 14U,             ///< The covariance was widened, because a source was rejected for too long.
   kTooLate = 1U << 15U,               ///< Input skipped: older than the history, or than the start.
   kBadCovariance = 1U << 16U,         ///< Input skipped: its covariance is not positive definite.
+  kFewFeatures = 1U << 17U,           ///< The last frame had too few features that could be used, or none came.
+  kFeaturesRejected = 1U << 18U,      ///< Most of the last frame's features are not believed.
+  kScaleUnknown = 1U << 19U,          ///< Lengths are in a unit of their own: one camera alone cannot tell metres.
 };
 
 /// Error-state order of the covariance: theta, position, velocity, gyroscope bias, accelerometer bias.

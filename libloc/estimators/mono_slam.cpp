@@ -1,0 +1,96 @@
+#include "libloc/estimators/mono_slam.hpp"
+
+#include <algorithm>
+
+#include "libloc/core/check.hpp"
+
+namespace loc {
+namespace {
+
+// Frames in a row on an earlier time line that mean: the clock was set back.
+constexpr int kSetBackAfter = 10;
+
+}  // namespace
+
+MonoSlam::MonoSlam(const SlamOptions& options) : filter_(options) {
+  require(options.motion == SlamMotion::kConstantVelocity, "motion: MonoSlam has no IMU, InertialSlam does");
+}
+
+void MonoSlam::reset() {
+  filter_.stop();
+  estimate_.valid = 0;
+  restored_ = false;
+  set_back_in_a_row_ = 0;
+}
+
+void MonoSlam::restore(const SlamSnapshot& snapshot) {
+  filter_.restore(snapshot);
+  restored_ = true;
+}
+
+// What the body did meanwhile is known no better than at the start.
+void MonoSlam::widen_after_gap(double pause_s) {
+  const SlamOptions& options = filter_.options();
+  Eigen::VectorXd variance = Eigen::VectorXd::Zero(filter_.layout().dim);
+  const auto add = [&](int first, double sigma) { variance.segment<3>(first).array() += sigma * sigma; };
+  add(kVelocity, options.sigma_velocity);
+  add(kAngularVelocity, options.sigma_angular_velocity);
+  add(kPosition, options.sigma_velocity * pause_s);
+  add(kTheta, std::min(options.sigma_angular_velocity * pause_s, 3.0));
+  filter_.widen(variance);
+}
+
+bool MonoSlam::process(const Measurement& measurement) {
+  const auto* frame = std::get_if<FeaturesMeasurement>(&measurement);
+  return frame != nullptr && frame->camera == filter_.options().camera_index && process_frame(*frame);
+}
+
+bool MonoSlam::process_frame(const FeaturesMeasurement& frame) {
+  // The camera's clock is all that there is.
+  if (!filter_.started()) {
+    filter_.start(frame.time_ns);
+    ++starts_;
+  } else if (restored_) {
+    filter_.set_time(frame.time_ns);
+    widen_after_gap(filter_.options().max_gap_s);
+  } else if (frame.time_ns <= filter_.time_ns()) {
+    ++not_increasing_;
+    next_status_ |= kTimeNotIncreasing;
+    if (++set_back_in_a_row_ < kSetBackAfter) return false;
+    filter_.set_time(frame.time_ns);
+    widen_after_gap(filter_.options().max_gap_s);
+    next_status_ |= kGap;
+    ++gaps_;
+  } else {
+    const double pause = to_seconds(frame.time_ns - filter_.time_ns());
+    if (pause > filter_.options().max_gap_s) {
+      filter_.set_time(frame.time_ns);
+      widen_after_gap(pause);
+      next_status_ |= kGap;
+      ++gaps_;
+    } else {
+      filter_.propagate(frame.time_ns);
+    }
+  }
+  restored_ = false;
+  set_back_in_a_row_ = 0;
+  estimate_ = filter_.update(frame).estimate;
+  estimate_.time_ns = frame.time_ns;
+  estimate_.host_time_ns = frame.host_time_ns;
+  estimate_.sequence = frame.sequence;
+  estimate_.status |= next_status_;
+  next_status_ = 0;
+  ++used_;
+  return true;
+}
+
+NamedCounts MonoSlam::counts() const {
+  NamedCounts out = {{"features.used", used_},
+                     {"features.time_not_increasing", not_increasing_},
+                     {"gaps", gaps_},
+                     {"starts", starts_}};
+  for (NamedCount& count : filter_.counts()) out.push_back(std::move(count));
+  return out;
+}
+
+}  // namespace loc

@@ -1,0 +1,576 @@
+#include "libloc/estimators/slam_filter.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+
+#include "libloc/core/check.hpp"
+#include "libloc/core/statistics.hpp"
+#include "libloc/geometry/so3.hpp"
+
+namespace loc {
+namespace {
+
+constexpr int kFewest = 3;  // features in a frame that hold a pose
+
+double root_mean_square(double sum, int count) {
+  return count > 0 ? std::sqrt(sum / count) : kUnknown;
+}
+
+// How a turn of the world by w moves the errors of a ray: the frame's first two axes feel (u_y, -u_x), u = Q^T w.
+Eigen::Matrix<double, 2, 3> turn_of_ray(const Eigen::Quaterniond& frame) {
+  const Eigen::Matrix3d to_frame = frame.conjugate().toRotationMatrix();
+  Eigen::Matrix<double, 2, 3> out;
+  out.row(0) = to_frame.row(1);
+  out.row(1) = -to_frame.row(0);
+  return out;
+}
+
+}  // namespace
+
+SlamFilter::SlamFilter(const SlamOptions& options)
+    : options_((options.check(), options)),
+      layout_(options),
+      camera_(options.camera),
+      covariance_(options.precision == SlamPrecision::kFloat, layout_.dim,
+                  layout_.dim + kInverseDepthDim * options.map.max_features, 2 * std::max(options.map.max_measured, 3)),
+      transition_(layout_),
+      ransac_(options.association, options.map.max_measured),
+      dx_(covariance_.capacity()),
+      shear_(covariance_.capacity(), 3) {
+  const auto features = static_cast<std::size_t>(options.map.max_features);
+  landmarks_.reserve(features);
+  measurements_.resize(features);
+  which_.reserve(features);
+  candidates_.reserve(features);
+  residual_.reserve(2 * features);
+  accepted_.reserve(2 * features);
+  accepted_residual_.reserve(2 * features);
+  points_before_.resize(features);
+  ranges_.reserve(features);
+  marked_.reserve(features);
+  depths_.reserve(features);
+  cells_.resize(static_cast<std::size_t>(options.map.grid_columns * options.map.grid_rows));
+  frame_.features.reserve(2 * features);
+}
+
+void SlamFilter::start(TimeNs time_ns, const SlamState& state, const Eigen::MatrixXd& covariance) {
+  state_ = state;
+  first_ = state;
+  time_ns_ = time_ns;
+  landmarks_.clear();
+  transition_.reset();
+  covariance_.reset(covariance);
+  frame_.counts = SlamCounts{};
+  frame_.features.clear();
+  add_known_landmarks();
+}
+
+void SlamFilter::start(TimeNs time_ns) {
+  SlamState state;
+  state.q_world_body = options_.q_world_body.normalized();
+  state.position = options_.position;
+  state.velocity = options_.velocity;
+  state.angular_velocity = options_.angular_velocity;
+  state.T_body_camera = options_.camera.T_body_camera;
+  state.time_offset_s = options_.camera.time_offset_s;
+  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(layout_.dim);
+  sigma.segment<3>(kTheta).setConstant(options_.sigma_orientation);
+  sigma.segment<3>(kPosition).setConstant(options_.sigma_position);
+  sigma.segment<3>(kVelocity).setConstant(options_.sigma_velocity);
+  if (layout_.inertial) {
+    sigma.segment<3>(kGyroscopeBias).setConstant(options_.imu_noise.gyroscope_bias_sigma);
+    sigma.segment<3>(kAccelerometerBias).setConstant(options_.imu_noise.accelerometer_bias_sigma);
+  } else {
+    sigma.segment<3>(kAngularVelocity).setConstant(options_.sigma_angular_velocity);
+  }
+  if (layout_.extrinsic_rotation >= 0) {
+    sigma.segment<3>(layout_.extrinsic_rotation).setConstant(options_.sigma_extrinsic_rotation);
+    sigma.segment<3>(layout_.extrinsic_position).setConstant(options_.sigma_extrinsic_position);
+  }
+  if (layout_.time_offset >= 0) sigma[layout_.time_offset] = options_.sigma_time_offset;
+  start(time_ns, state, Eigen::MatrixXd(sigma.array().square().matrix().asDiagonal()));
+}
+
+void SlamFilter::stop() {
+  time_ns_ = kNoTime;
+  landmarks_.clear();
+  transition_.reset();
+}
+
+void SlamFilter::propagate(TimeNs time_ns) {
+  const double dt = to_seconds(time_ns - time_ns_);
+  if (dt > 0) {
+    transition_.move(state_, dt, options_.acceleration_density, options_.angular_acceleration_density);
+  }
+  time_ns_ = time_ns;
+}
+
+void SlamFilter::propagate(TimeNs time_ns, const InertialStep& step, const InertialStepNoise& noise) {
+  transition_.move(state_, step, noise, {0, 0, -options_.gravity});
+  time_ns_ = time_ns;
+}
+
+void SlamFilter::bring_covariance_up() {
+  first_ = state_;
+  if (transition_.empty()) return;
+  covariance_.propagate(transition_.f(), transition_.q());
+  transition_.reset();
+}
+
+void SlamFilter::widen(const Eigen::VectorXd& variance) {
+  bring_covariance_up();
+  for (int i = 0; i < layout_.dim; ++i) covariance_.inflate(i, 1, variance[i]);
+}
+
+Eigen::MatrixXd SlamFilter::head_covariance() const {
+  Eigen::MatrixXd p(layout_.dim, layout_.dim);
+  covariance_.read(0, 0, p);
+  if (transition_.empty()) return p;
+  return transition_.f() * p * transition_.f().transpose() + transition_.q();
+}
+
+double SlamFilter::sigma_px(const FeaturesMeasurement& frame) const {
+  const bool says = !options_.override_sigma && std::isfinite(frame.sigma_px) && frame.sigma_px > 0;
+  return says ? frame.sigma_px : options_.sigma_px;
+}
+
+// Identities of the frame to landmarks. One that comes twice belongs to nobody.
+void SlamFilter::match(const FeaturesMeasurement& frame) {
+  by_id_.clear();
+  taken_.assign(frame.features.size(), 0);
+  for (std::size_t i = 0; i < frame.features.size(); ++i) {
+    const FeatureObservation& feature = frame.features[i];
+    if (!feature.pixel_px.allFinite() || !camera_.in_image(feature.pixel_px)) {
+      ++not_usable_;
+      taken_[i] = 1;
+      continue;
+    }
+    by_id_.emplace_back(feature.id, static_cast<int>(i));
+  }
+  std::sort(by_id_.begin(), by_id_.end());
+  for (std::size_t i = 0; i + 1 < by_id_.size(); ++i) {
+    if (by_id_[i].first != by_id_[i + 1].first) continue;
+    ambiguous_ += 1;
+    taken_[static_cast<std::size_t>(by_id_[i].second)] = 1;
+    taken_[static_cast<std::size_t>(by_id_[i + 1].second)] = 1;
+  }
+  for (SlamLandmark& landmark : landmarks_) {
+    landmark.observation = landmark.slot = -1;
+    landmark.state = SlamFeatureState::kPredicted;
+    landmark.innovation_cov.setConstant(kUnknown);
+    const auto predicted = predict(state_, camera_, landmark.point);
+    landmark.predicted_px = predicted ? *predicted : Eigen::Vector2d::Constant(kUnknown);
+    landmark.visible = predicted && camera_.in_image(*predicted, options_.map.border_px);
+    if (landmark.visible) landmark.last_visible_ns = time_ns_;
+    const auto found = std::lower_bound(by_id_.begin(), by_id_.end(), std::pair{landmark.id, -1});
+    if (found == by_id_.end() || found->first != landmark.id) continue;
+    const auto index = static_cast<std::size_t>(found->second);
+    if (taken_[index] == 0) landmark.observation = found->second;
+    taken_[index] = 1;
+  }
+}
+
+bool SlamFilter::linearise(SlamLandmark& landmark, const Eigen::Vector2d& pixel_px, BlockMeasurement& out) const {
+  const auto predicted = predict(state_, camera_, landmark.point);
+  if (!predicted) return false;
+  const bool first = options_.consistency == SlamConsistency::kFirstEstimate;
+  SlamState at = state_;
+  SlamPoint point = landmark.point;
+  if (first) {
+    at.q_world_body = first_.q_world_body;
+    at.position = first_.position;
+    at.velocity = first_.velocity;
+    // The depth does not turn or move with the world: its latest value is the better one.
+    if (point.converted) {
+      point.position = landmark.first.position;
+    } else {
+      point.inverse_depth.anchor = landmark.first.inverse_depth.anchor;
+      point.inverse_depth.frame = landmark.first.inverse_depth.frame;
+    }
+  }
+  const auto jacobian = jacobian_of(at, layout_, camera_, point);
+  if (!jacobian) return false;
+  out.rows = 2;
+  out.head.topRows<2>() = jacobian->head;
+  out.block = landmark.offset;
+  out.block_dim = landmark.point.dim();
+  out.block_jacobian.topRows<2>() = jacobian->block;
+  out.residual.head<2>() = pixel_px - *predicted;
+  return true;
+}
+
+void SlamFilter::select_measured(const FeaturesMeasurement& frame) {
+  const double sigma = sigma_px(frame);
+  candidates_.clear();
+  which_.clear();
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    SlamLandmark& landmark = landmarks_[i];
+    if (landmark.observation < 0) continue;
+    BlockMeasurement& measurement = measurements_[i];
+    measurement.noise_cov.topLeftCorner<2, 2>() = sigma * sigma * Eigen::Matrix2d::Identity();
+    const Eigen::Vector2d& pixel = frame.features[static_cast<std::size_t>(landmark.observation)].pixel_px;
+    if (!linearise(landmark, pixel, measurement)) {
+      landmark.state = SlamFeatureState::kRejected;
+      continue;
+    }
+    landmark.innovation_cov = covariance_.innovation_cov(measurement).topLeftCorner<2, 2>();
+    candidates_.push_back(static_cast<int>(i));
+  }
+  const auto most = static_cast<std::size_t>(options_.map.max_measured);
+  if (candidates_.size() > most) {
+    const auto tells = [&](int i) { return landmarks_[static_cast<std::size_t>(i)].innovation_cov.determinant(); };
+    std::nth_element(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(most), candidates_.end(),
+                     [&](int a, int b) { return tells(a) > tells(b); });
+    candidates_.resize(most);
+    std::sort(candidates_.begin(), candidates_.end());
+  }
+  which_ = candidates_;
+}
+
+// After covariance_.update(): the state takes the correction, and what follows from it.
+void SlamFilter::apply_update() {
+  const SlamState before = state_;
+  boxplus(state_, layout_, dx_);
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    SlamLandmark& landmark = landmarks_[i];
+    points_before_[i] = landmark.point;
+    landmark.point.boxplus(dx_.segment(landmark.offset, landmark.point.dim()));
+  }
+  if (options_.consistency == SlamConsistency::kPlain) return;
+
+  // T = I + U E^T, which takes the unobservable directions at the state before to those after the update: an error of
+  // attitude theta turns what is known of the world by w = R theta, and everything moves by w x x.
+  const Eigen::Matrix3d to_world = before.q_world_body.toRotationMatrix();
+  const int dim = covariance_.dim();
+  shear_.topRows(dim).setZero();
+  const auto move = [&](int row, const Eigen::Vector3d& after, const Eigen::Vector3d& was) {
+    shear_.middleRows<3>(row) = -so3::hat(after - was) * to_world;
+  };
+  shear_.middleRows<3>(kTheta) =
+      (state_.q_world_body.conjugate() * before.q_world_body).toRotationMatrix() - Eigen::Matrix3d::Identity();
+  move(kPosition, state_.position, before.position);
+  move(kVelocity, state_.velocity, before.velocity);
+  if (options_.consistency == SlamConsistency::kInvariant) {
+    for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+      const SlamLandmark& landmark = landmarks_[i];
+      const SlamPoint& was = points_before_[i];
+      if (landmark.point.converted) {
+        move(landmark.offset, landmark.point.position, was.position);
+        continue;
+      }
+      move(landmark.offset + kAnchor, landmark.point.inverse_depth.anchor, was.inverse_depth.anchor);
+      shear_.middleRows<2>(landmark.offset + kRay) =
+          (turn_of_ray(landmark.point.inverse_depth.frame) - turn_of_ray(was.inverse_depth.frame)) * to_world;
+    }
+  }
+  covariance_.shear(kTheta, shear_);
+}
+
+void SlamFilter::update_agreeing() {
+  if (which_.empty()) return;
+  covariance_.innovate(measurements_, which_);
+  residual_.clear();
+  for (const int i : which_) {
+    const BlockMeasurement& measurement = measurements_[static_cast<std::size_t>(i)];
+    residual_.push_back(measurement.residual[0]);
+    residual_.push_back(measurement.residual[1]);
+  }
+  const std::vector<char>* agrees = nullptr;
+  if (options_.association.ransac) agrees = &ransac_.run(covariance_, residual_, static_cast<std::uint64_t>(time_ns_));
+  accepted_.clear();
+  accepted_residual_.clear();
+  for (std::size_t k = 0; k < which_.size(); ++k) {
+    SlamLandmark& landmark = landmarks_[static_cast<std::size_t>(which_[k])];
+    const Eigen::Vector2d r(residual_[2 * k], residual_[2 * k + 1]);
+    const bool use =
+        agrees != nullptr ? (*agrees)[k] != 0 : r.dot(landmark.innovation_cov.inverse() * r) < ransac_.gate();
+    landmark.state = use ? SlamFeatureState::kMeasured : SlamFeatureState::kRejected;
+    if (!use) continue;
+    for (int row = 0; row < 2; ++row) {
+      accepted_.push_back(static_cast<int>(2 * k) + row);
+      accepted_residual_.push_back(r[row]);
+    }
+  }
+  if (accepted_.empty()) return;
+  if (!covariance_.update(accepted_, accepted_residual_, dx_, nis_)) {
+    ++failed_updates_;
+    for (SlamLandmark& landmark : landmarks_) {
+      if (landmark.state == SlamFeatureState::kMeasured) landmark.state = SlamFeatureState::kRejected;
+    }
+    return;
+  }
+  frame_.nis += nis_;
+  frame_.nis_dim += static_cast<int>(accepted_.size());
+  apply_update();
+}
+
+void SlamFilter::rescue(const FeaturesMeasurement& frame) {
+  which_.clear();
+  for (const int i : candidates_) {
+    SlamLandmark& landmark = landmarks_[static_cast<std::size_t>(i)];
+    if (landmark.state != SlamFeatureState::kRejected) continue;
+    BlockMeasurement& measurement = measurements_[static_cast<std::size_t>(i)];
+    const Eigen::Vector2d& pixel = frame.features[static_cast<std::size_t>(landmark.observation)].pixel_px;
+    if (!linearise(landmark, pixel, measurement)) continue;
+    const Eigen::Matrix2d s = covariance_.innovation_cov(measurement).topLeftCorner<2, 2>();
+    const Eigen::Vector2d r = measurement.residual.head<2>();
+    if (!(r.dot(s.inverse() * r) < ransac_.gate())) continue;
+    which_.push_back(i);
+  }
+  if (which_.empty()) return;
+  covariance_.innovate(measurements_, which_);
+  accepted_.clear();
+  accepted_residual_.clear();
+  for (std::size_t k = 0; k < which_.size(); ++k) {
+    for (int row = 0; row < 2; ++row) {
+      accepted_.push_back(static_cast<int>(2 * k) + row);
+      accepted_residual_.push_back(measurements_[static_cast<std::size_t>(which_[k])].residual[row]);
+    }
+  }
+  if (!covariance_.update(accepted_, accepted_residual_, dx_, nis_)) {
+    ++failed_updates_;
+    return;
+  }
+  for (const int i : which_) landmarks_[static_cast<std::size_t>(i)].state = SlamFeatureState::kRescued;
+  frame_.nis += nis_;
+  frame_.nis_dim += static_cast<int>(accepted_.size());
+  apply_update();
+}
+
+// Who was measured, and who should have been.
+void SlamFilter::judge(const FeaturesMeasurement& frame) {
+  double before = 0;
+  double after = 0;
+  int used = 0;
+  const double forget = 1 - 1.0 / (2 * options_.map.delete_after_tries);
+  SlamCounts& counts = frame_.counts;
+  for (SlamLandmark& landmark : landmarks_) {
+    const bool measured = landmark.state == SlamFeatureState::kMeasured || landmark.state == SlamFeatureState::kRescued;
+    if (landmark.visible) ++counts.visible;
+    if (landmark.visible || landmark.observation >= 0) {
+      landmark.tries = forget * landmark.tries + 1;
+      // One that was found, but is not among the most informative, did nothing wrong.
+      const bool fine = measured || (landmark.observation >= 0 && landmark.state == SlamFeatureState::kPredicted);
+      landmark.hits = forget * landmark.hits + (fine ? 1 : 0);
+    }
+    if (landmark.state == SlamFeatureState::kRejected) ++counts.rejected;
+    if (landmark.state == SlamFeatureState::kRescued) ++counts.rescued;
+    if (!measured) continue;
+    ++counts.measured;
+    ++landmark.measured;
+    landmark.last_measured_ns = time_ns_;
+    landmark.last_visible_ns = time_ns_;
+    const Eigen::Vector2d& pixel = frame.features[static_cast<std::size_t>(landmark.observation)].pixel_px;
+    before += (pixel - landmark.predicted_px).squaredNorm();
+    if (const auto now = predict(state_, camera_, landmark.point)) after += (pixel - *now).squaredNorm();
+    ++used;
+  }
+  frame_.reprojection_before_px = root_mean_square(before, used);
+  frame_.reprojection_after_px = root_mean_square(after, used);
+}
+
+void SlamFilter::report(const FeaturesMeasurement& frame) {
+  frame_.features.clear();
+  for (const SlamLandmark& landmark : landmarks_) {
+    if (!landmark.visible && landmark.observation < 0) continue;
+    SlamFeature& out = frame_.features.emplace_back();
+    out.id = landmark.id;
+    out.state = landmark.state;
+    out.converted = landmark.point.converted;
+    if (landmark.observation >= 0)
+      out.pixel_px = frame.features[static_cast<std::size_t>(landmark.observation)].pixel_px;
+    out.predicted_px = landmark.predicted_px;
+    out.innovation_cov = landmark.innovation_cov;
+    if (const auto now = predict(state_, camera_, landmark.point)) out.estimated_px = *now;
+    if (landmark.point.converted) {
+      out.inverse_depth = 1 / (landmark.point.position - frame_.camera_position).norm();
+    } else {
+      out.inverse_depth = landmark.point.inverse_depth.inverse_depth;
+      const int at = landmark.offset + kInverseDepth;
+      out.sigma_inverse_depth = std::sqrt(std::max(0.0, covariance_(at, at)));
+    }
+  }
+}
+
+const SlamFrame& SlamFilter::update(const FeaturesMeasurement& frame) {
+  const auto begin = std::chrono::steady_clock::now();
+  static_cast<Stamp&>(frame_) = frame;
+  frame_.camera = frame.camera;
+  frame_.counts = SlamCounts{};
+  frame_.counts.in_frame = static_cast<std::int64_t>(frame.features.size());
+  frame_.nis = 0;
+  frame_.nis_dim = 0;
+  bring_covariance_up();
+  match(frame);
+  select_measured(frame);
+  update_agreeing();
+  rescue(frame);
+  judge(frame);
+  const std::size_t expected = landmarks_.size();
+
+  const Pose3 T_world_camera = state_.T_world_camera();
+  frame_.camera_position = T_world_camera.translation;
+  frame_.q_world_camera = T_world_camera.rotation;
+  convert_landmarks();
+  delete_landmarks();
+  add_landmarks(frame);
+  report(frame);
+
+  SlamCounts& counts = frame_.counts;
+  counts.map = static_cast<std::int64_t>(landmarks_.size());
+  total_.in_frame += counts.in_frame;
+  total_.measured += counts.measured;
+  total_.rescued += counts.rescued;
+  total_.rejected += counts.rejected;
+  total_.added += counts.added;
+  total_.converted += counts.converted;
+  total_.deleted += counts.deleted;
+  ++frames_;
+
+  frame_.estimate = estimate();
+  if (expected > 0 && counts.measured < kFewest) frame_.estimate.status |= kFewFeatures;
+  if (counts.rejected > counts.measured) frame_.estimate.status |= kFeaturesRejected;
+  frame_.time_spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return frame_;
+}
+
+bool SlamFilter::zero_velocity(double sigma_velocity, const Eigen::Vector3d& rate, double sigma_rate) {
+  bring_covariance_up();
+  BlockMeasurement& m = measurements_.front();
+  m.rows = 6;
+  m.block = -1;
+  m.head.setZero();
+  m.noise_cov.setZero();
+  m.head.block<3, 3>(0, kVelocity).setIdentity();
+  m.residual.head<3>() = -state_.velocity;
+  // The rate: with an IMU that of the gyroscope is its bias, without one the state's own is zero.
+  m.head.block<3, 3>(3, layout_.inertial ? kGyroscopeBias : kAngularVelocity).setIdentity();
+  m.residual.tail<3>() = layout_.inertial ? Eigen::Vector3d(rate - state_.gyroscope_bias) : -state_.angular_velocity;
+  for (int i = 0; i < 3; ++i) {
+    m.noise_cov(i, i) = sigma_velocity * sigma_velocity;
+    m.noise_cov(3 + i, 3 + i) = sigma_rate * sigma_rate;
+  }
+  constexpr double kGate = 22.46;  // chi-square of 6, 0.999
+  which_.assign(1, 0);
+  covariance_.innovate(measurements_, which_);
+  Eigen::Matrix<double, 6, 6> s;
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) s(i, j) = covariance_.s(std::max(i, j), std::min(i, j));
+  }
+  if (!(m.residual.dot(s.ldlt().solve(m.residual)) < kGate)) return false;
+  accepted_.assign({0, 1, 2, 3, 4, 5});
+  accepted_residual_.assign(m.residual.data(), m.residual.data() + 6);
+  if (!covariance_.update(accepted_, accepted_residual_, dx_, nis_)) {
+    ++failed_updates_;
+    return false;
+  }
+  apply_update();
+  return true;
+}
+
+bool SlamFilter::fuse_position(const Eigen::Vector3d& position, const Eigen::Matrix3d& position_cov,
+                               const Eigen::Vector3d& lever) {
+  bring_covariance_up();
+  BlockMeasurement& m = measurements_.front();
+  const Eigen::Matrix3d to_world = state_.q_world_body.toRotationMatrix();
+  m.rows = 3;
+  m.block = -1;
+  m.head.setZero();
+  m.head.block<3, 3>(0, kPosition).setIdentity();
+  m.head.block<3, 3>(0, kTheta) = -to_world * so3::hat(lever);
+  m.noise_cov.topLeftCorner<3, 3>() = position_cov;
+  m.residual.head<3>() = position - state_.position - to_world * lever;
+  constexpr double kGate = 16.27;  // chi-square of 3, 0.999
+  which_.assign(1, 0);
+  const Eigen::Matrix3d s = covariance_.innovation_cov(m).topLeftCorner<3, 3>();
+  const Eigen::Vector3d r = m.residual.head<3>();
+  if (!(r.dot(s.ldlt().solve(r)) < kGate)) return false;
+  covariance_.innovate(measurements_, which_);
+  accepted_.assign({0, 1, 2});
+  accepted_residual_.assign(r.data(), r.data() + 3);
+  if (!covariance_.update(accepted_, accepted_residual_, dx_, nis_)) {
+    ++failed_updates_;
+    return false;
+  }
+  apply_update();
+  return true;
+}
+
+Estimate SlamFilter::estimate() const {
+  Estimate out;
+  out.time_ns = time_ns_;
+  out.valid = kValidOrientation | kValidPosition | kValidVelocity | kValidCovariance;
+  out.q_world_body = state_.q_world_body;
+  out.position = state_.position;
+  out.velocity = state_.velocity;
+  out.angular_velocity = state_.angular_velocity;
+  if (layout_.inertial) {
+    out.valid |= kValidGyroscopeBias | kValidAccelerometerBias;
+    out.gyroscope_bias = state_.gyroscope_bias;
+    out.accelerometer_bias = state_.accelerometer_bias;
+  } else if (options_.landmarks.empty()) {
+    out.status |= kScaleUnknown;
+  }
+  out.covariance_dim = layout_.inertial ? kInertialDim : kGyroscopeBias;
+  // The first rows and columns of F P F^T + Q.
+  Eigen::Matrix<double, kMaxHeadDim, kMaxHeadDim> p;
+  auto head = p.topLeftCorner(layout_.dim, layout_.dim);
+  covariance_.read(0, 0, head);
+  out.covariance.setConstant(kUnknown);
+  const int n = out.covariance_dim;
+  if (transition_.empty()) {
+    out.covariance.topLeftCorner(n, n) = p.topLeftCorner(n, n);
+  } else {
+    Eigen::Matrix<double, kMaxHeadDim, kMaxHeadDim> fp;
+    fp.topLeftCorner(layout_.dim, layout_.dim) = transition_.f().lazyProduct(head);
+    out.covariance.topLeftCorner(n, n) =
+        fp.topLeftCorner(n, layout_.dim).lazyProduct(transition_.f().topRows(n).transpose());
+    out.covariance.topLeftCorner(n, n) += transition_.q().topLeftCorner(n, n);
+  }
+  return out;
+}
+
+NamedCounts SlamFilter::counts() const {
+  return {{"slam.frames", frames_},
+          {"slam.features", total_.in_frame},
+          {"slam.features.not_usable", not_usable_},
+          {"slam.features.ambiguous", ambiguous_},
+          {"slam.measured", total_.measured},
+          {"slam.rescued", total_.rescued},
+          {"slam.rejected", total_.rejected},
+          {"slam.added", total_.added},
+          {"slam.converted", total_.converted},
+          {"slam.deleted", total_.deleted},
+          {"slam.failed_updates", failed_updates_},
+          {"slam.map", static_cast<std::int64_t>(landmarks_.size())}};
+}
+
+SlamSnapshot SlamFilter::snapshot() const {
+  return {time_ns_, state_, landmarks_, covariance_.dense()};
+}
+
+void SlamFilter::restore(const SlamSnapshot& snapshot) {
+  require(snapshot.landmarks.size() <= static_cast<std::size_t>(options_.map.max_features),
+          "snapshot has " + std::to_string(snapshot.landmarks.size()) + " features, map.max_features is " +
+              std::to_string(options_.map.max_features));
+  int dim = layout_.dim;
+  for (const SlamLandmark& landmark : snapshot.landmarks) {
+    require(landmark.offset == dim, "snapshot: feature " + std::to_string(landmark.id) + " is out of place");
+    dim += landmark.point.dim();
+  }
+  require(snapshot.covariance.rows() == dim && snapshot.covariance.cols() == dim,
+          "snapshot: the covariance does not fit its features (motion model, estimate_extrinsics or "
+          "estimate_time_offset may differ)");
+  require(snapshot.time_ns != kNoTime && snapshot.covariance.allFinite(), "snapshot: not finite, or without a time");
+  time_ns_ = snapshot.time_ns;
+  state_ = snapshot.state;
+  first_ = snapshot.state;
+  landmarks_ = snapshot.landmarks;
+  landmarks_.reserve(static_cast<std::size_t>(options_.map.max_features));
+  covariance_.set_dense(snapshot.covariance);
+  transition_.reset();
+}
+
+}  // namespace loc

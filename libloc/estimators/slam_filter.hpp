@@ -1,0 +1,178 @@
+// The extended Kalman filter of SLAM with one camera: head (slam_state.hpp) and features (slam_observation.hpp) in one
+// state with one covariance. It knows no streams and no clocks but the times that it is given: mono_slam.hpp and
+// inertial_slam.hpp drive it.
+//
+// One frame:
+//   1. the covariance is brought to the frame's time                                 P = F P F^T + Q
+//   2. features are predicted, and matched with the frame's by identity
+//   3. of those matched the most informative ones (largest det S) are taken, up to max_measured
+//   4. 1-point RANSAC finds which of them agree; those update the state together
+//   5. the others are predicted anew: who is within the gate now was right (rescued) and updates it, too
+//   6. features that are well known become XYZ, those that are expected and not found are deleted, new ones are added
+//      where the picture is empty
+// There is no initialisation phase: a feature counts from the first frame on, its depth is unknown within the prior.
+//
+// Not observable: without known landmarks place and heading of the world (and its tilt without an IMU), which are as
+// the start says; without an IMU also the unit of lengths, which is that of the prior of inverse depths
+// (kScaleUnknown). Consistency: SlamConsistency. P is of errors at the latest estimate whichever is chosen. Source: J.
+// Civera, A. Davison, J. Montiel, "Inverse depth parametrization for monocular SLAM", IEEE Transactions on Robotics 24,
+// 2008; J. Civera et al., "1-Point RANSAC for extended Kalman filtering", Journal of Field Robotics 27, 2010.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "libloc/core/named_count.hpp"
+#include "libloc/estimators/slam_frame.hpp"
+#include "libloc/estimators/slam_observation.hpp"
+#include "libloc/estimators/slam_options.hpp"
+#include "libloc/estimators/slam_ransac.hpp"
+#include "libloc/estimators/slam_state.hpp"
+#include "libloc/filter/map_covariance.hpp"
+
+namespace loc {
+
+/// A feature of the map.
+struct SlamLandmark {
+  std::int64_t id = -1;
+  int offset = 0;  ///< of its errors in the state
+  SlamPoint point;
+  SlamPoint first;   ///< as it was first estimated, for first-estimate Jacobians
+  double tries = 0;  ///< frames in which it was expected, those long ago count less
+  double hits = 0;   ///< and was measured
+  std::int64_t measured = 0;
+  TimeNs last_measured_ns = kNoTime;
+  TimeNs last_visible_ns = kNoTime;
+  bool known = false;  ///< its place was given
+  // Of the frame at hand.
+  bool visible = false;
+  int observation = -1;  ///< index in the frame; -1: no such identity
+  int slot = -1;         ///< index among the measurements; -1: not used
+  SlamFeatureState state = SlamFeatureState::kPredicted;
+  Eigen::Vector2d predicted_px = Eigen::Vector2d::Constant(kUnknown);
+  Eigen::Matrix2d innovation_cov = Eigen::Matrix2d::Constant(kUnknown);
+};
+
+/// All that a filter knows: to be saved, and to go on from.
+struct SlamSnapshot {
+  TimeNs time_ns = kNoTime;
+  SlamState state;
+  std::vector<SlamLandmark> landmarks;
+  Eigen::MatrixXd covariance;  ///< head and features, symmetric
+};
+
+class SlamFilter {
+ public:
+  /// @throws std::invalid_argument as SlamOptions::check.
+  explicit SlamFilter(const SlamOptions& options);
+
+  /// Forgets the map. @param covariance of the head, layout().dim square
+  void start(TimeNs time_ns, const SlamState& state, const Eigen::MatrixXd& covariance);
+  /// Camera alone: as the options say.
+  void start(TimeNs time_ns);
+  bool started() const { return time_ns_ != kNoTime; }
+  /// Forgets all but the options and the counts.
+  void stop();
+  /// The clock jumps, the state stays: what happened meanwhile is for widen().
+  void set_time(TimeNs time_ns) { time_ns_ = time_ns; }
+
+  /// Moves on without an IMU. @param time_ns not before time_ns()
+  void propagate(TimeNs time_ns);
+  /// Moves on by a step of the IMU. @param time_ns its end
+  void propagate(TimeNs time_ns, const InertialStep& step, const InertialStepNoise& noise);
+  /// Head's variances grow: what happened meanwhile is not known. @param variance of each error of the head
+  void widen(const Eigen::VectorXd& variance);
+
+  /// A frame at time_ns(). The result holds until the next call.
+  const SlamFrame& update(const FeaturesMeasurement& frame);
+
+  /// The body does not move: v = 0, and with an IMU the mean rate is the gyroscope's bias.
+  /// @param rate as measured, bias not removed [rad/s] @returns false when the filter knows better (gate).
+  bool zero_velocity(double sigma_velocity, const Eigen::Vector3d& rate, double sigma_rate);
+  /// Place of a point of the body. @param lever in body [m] @returns false when outside the gate.
+  bool fuse_position(const Eigen::Vector3d& position, const Eigen::Matrix3d& position_cov,
+                     const Eigen::Vector3d& lever);
+
+  TimeNs time_ns() const { return time_ns_; }
+  const SlamState& state() const { return state_; }
+  const SlamLayout& layout() const { return layout_; }
+  const SlamOptions& options() const { return options_; }
+  const std::vector<SlamLandmark>& landmarks() const { return landmarks_; }
+  const SlamFrame& frame() const { return frame_; }
+  const MapCovariance& covariance() const { return covariance_; }
+  /// Covariance of the head now, also between frames.
+  Eigen::MatrixXd head_covariance() const;
+  /// Pose, velocity, biases, their covariance; stamp and sequence are the caller's.
+  Estimate estimate() const;
+  std::vector<SlamMapPoint> map() const;
+  /// What has been counted since the start.
+  NamedCounts counts() const;
+
+  SlamSnapshot snapshot() const;
+  /// @throws std::invalid_argument when it does not fit the options.
+  void restore(const SlamSnapshot& snapshot);
+
+ private:
+  void bring_covariance_up();
+  void match(const FeaturesMeasurement& frame);
+  void select_measured(const FeaturesMeasurement& frame);
+  bool linearise(SlamLandmark& landmark, const Eigen::Vector2d& pixel_px, BlockMeasurement& out) const;
+  void update_agreeing();
+  void rescue(const FeaturesMeasurement& frame);
+  void apply_update();
+  void judge(const FeaturesMeasurement& frame);
+  void report(const FeaturesMeasurement& frame);
+
+  // slam_filter_map.cpp
+  void delete_landmarks();
+  void convert_landmarks();
+  void add_landmarks(const FeaturesMeasurement& frame);
+  void make_room(int wanted);
+  void remove_marked();
+  bool add_landmark(const FeatureObservation& observation, double inverse_depth, double sigma);
+  double usual_inverse_depth() const;
+  void add_known_landmarks();
+
+  double sigma_px(const FeaturesMeasurement& frame) const;
+
+  SlamOptions options_;
+  SlamLayout layout_;
+  Camera camera_;
+  MapCovariance covariance_;
+  SlamTransition transition_;
+  OnePointRansac ransac_;
+  TimeNs time_ns_ = kNoTime;
+  SlamState state_;
+  SlamState first_;                      // of this time, before any update: for first-estimate Jacobians
+  std::vector<SlamLandmark> landmarks_;  // ascending offsets
+  SlamFrame frame_;
+
+  // Room for one frame's work, so that nothing is allocated.
+  std::vector<std::pair<std::int64_t, int>> by_id_;  // of the frame's features
+  std::vector<char> taken_;                          // of the frame's features
+  std::vector<BlockMeasurement> measurements_;
+  std::vector<int> which_;
+  std::vector<int> candidates_;
+  std::vector<double> residual_;
+  std::vector<int> accepted_;
+  std::vector<double> accepted_residual_;
+  std::vector<SlamPoint> points_before_;
+  std::vector<CovarianceRange> ranges_;
+  std::vector<char> marked_;
+  std::vector<int> cells_;
+  mutable std::vector<double> depths_;
+  Eigen::VectorXd dx_;
+  Eigen::MatrixX3d shear_;
+  double nis_ = 0;
+  double frame_sigma_px_ = kUnknown;
+
+  std::int64_t frames_ = 0;
+  std::int64_t ambiguous_ = 0;
+  std::int64_t not_usable_ = 0;
+  std::int64_t failed_updates_ = 0;
+  SlamCounts total_;
+};
+
+}  // namespace loc

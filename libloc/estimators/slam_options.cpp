@@ -1,0 +1,93 @@
+#include "libloc/estimators/slam_options.hpp"
+
+#include <array>
+#include <set>
+#include <stdexcept>
+
+#include "libloc/core/check.hpp"
+
+namespace loc {
+namespace {
+
+constexpr std::array kConsistencies = {"plain", "first-estimate", "invariant"};
+
+void require_at_least(const char* name, int value, int least) {
+  require(value >= least, name, value, "must be at least " + std::to_string(least));
+}
+
+void require_probability(const char* name, double value) {
+  require(value > 0 && value < 1, name, value, "must be between 0 and 1");
+}
+
+}  // namespace
+
+const char* slam_consistency_name(SlamConsistency consistency) {
+  return kConsistencies.at(static_cast<std::size_t>(consistency));
+}
+
+SlamConsistency parse_slam_consistency(std::string_view name) {
+  for (std::size_t i = 0; i < kConsistencies.size(); ++i) {
+    if (name == kConsistencies[i]) return static_cast<SlamConsistency>(i);
+  }
+  throw std::invalid_argument("consistency '" + std::string(name) + "': must be plain, first-estimate or invariant");
+}
+
+void SlamMapOptions::check() const {
+  require_at_least("map.max_features", max_features, 4);
+  require(max_features <= 2000, "map.max_features", max_features, "must be at most 2000: memory grows with its square");
+  require_at_least("map.max_measured", max_measured, 4);
+  require_at_least("map.min_visible", min_visible, 1);
+  require(min_visible <= max_features, "map.min_visible", min_visible, "must not be above map.max_features");
+  require_at_least("map.max_added", max_added, 1);
+  require_at_least("map.grid_columns", grid_columns, 1);
+  require_at_least("map.grid_rows", grid_rows, 1);
+  require(grid_columns <= 1000 && grid_rows <= 1000, "map.grid_columns and map.grid_rows must be at most 1000");
+  require_not_negative("map.min_separation_px", min_separation_px);
+  require_not_negative("map.border_px", border_px);
+  require_positive("map.inverse_depth", inverse_depth);
+  require_positive("map.sigma_inverse_depth", sigma_inverse_depth);
+  require_not_negative("map.max_linearity_index", max_linearity_index);
+  require_at_least("map.delete_after_tries", delete_after_tries, 2);
+  require(delete_below_ratio >= 0 && delete_below_ratio <= 1, "map.delete_below_ratio", delete_below_ratio,
+          "must be from 0 to 1");
+}
+
+void SlamAssociationOptions::check() const {
+  require_probability("association.gate_probability", gate_probability);
+  require_probability("association.ransac_probability", ransac_probability);
+  require_at_least("association.max_hypotheses", max_hypotheses, 1);
+}
+
+void SlamOptions::check() const {
+  camera.check();
+  require(camera_index >= 0, "camera_index", camera_index, "must not be negative");
+  require(position.allFinite() && velocity.allFinite() && angular_velocity.allFinite(),
+          "position, velocity and angular_velocity must be finite");
+  require(q_world_body.coeffs().allFinite() && q_world_body.norm() > 1e-6, "q_world_body must be finite, and not zero");
+  require_not_negative("sigma_position", sigma_position);
+  require_not_negative("sigma_orientation", sigma_orientation);
+  require_not_negative("sigma_velocity", sigma_velocity);
+  require_not_negative("sigma_angular_velocity", sigma_angular_velocity);
+  require_not_negative("acceleration_density", acceleration_density);
+  require_not_negative("angular_acceleration_density", angular_acceleration_density);
+  imu_noise.check();
+  require_positive("gravity", gravity);
+  require_positive("sigma_px", sigma_px);
+  require_positive("sigma_extrinsic_rotation", sigma_extrinsic_rotation);
+  require_positive("sigma_extrinsic_position", sigma_extrinsic_position);
+  require_positive("sigma_time_offset", sigma_time_offset);
+  require_positive("max_gap_s", max_gap_s);
+  map.check();
+  association.check();
+  require(landmarks.size() <= static_cast<std::size_t>(map.max_features),
+          "landmarks: more than map.max_features = " + std::to_string(map.max_features));
+  std::set<std::int64_t> ids;
+  for (const KnownLandmark& landmark : landmarks) {
+    const std::string name = "landmarks[" + std::to_string(ids.size()) + "]";
+    require(landmark.position.allFinite(), name + ".position must be finite");
+    require_not_negative(name + ".sigma", landmark.sigma);
+    require(ids.insert(landmark.id).second, name + ".id", static_cast<double>(landmark.id), "comes twice");
+  }
+}
+
+}  // namespace loc

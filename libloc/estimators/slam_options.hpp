@@ -1,0 +1,127 @@
+// Settings of SLAM with one camera: one struct for both motion models. Defaults are those of real sensors.
+// Names in brackets are those of Popov, "Monocular simultaneous location and mapping based on recursive filtering",
+// St. Petersburg 2015, 4.1.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "libloc/core/time.hpp"
+#include "libloc/sensors/imu_noise.hpp"
+#include "libloc/sensors/rig.hpp"
+
+namespace loc {
+
+enum class SlamMotion : std::uint8_t {
+  kConstantVelocity,  ///< camera alone: white acceleration; lengths in an unknown unit unless landmarks are known
+  kInertial           ///< an IMU: metres, and a world with z up
+};
+
+/// What keeps the filter from learning what it cannot know (place, heading) out of its own linearisation errors.
+enum class SlamConsistency : std::uint8_t {
+  kPlain,          ///< nothing: Jacobians at the latest estimate
+  kFirstEstimate,  ///< Jacobians by pose, velocity, anchor and ray at their first estimates (Huang, Mourikis,
+                   ///< Roumeliotis 2010)
+  kInvariant  ///< Jacobians at the latest estimate; errors of everything that turns with the world count in a frame
+              ///< that turns with the attitude's error (right-invariant EKF: Barrau, Bonnabel 2015)
+};
+
+enum class SlamPrecision : std::uint8_t { kDouble, kFloat };
+
+const char* slam_consistency_name(SlamConsistency consistency);
+/// "plain", "first-estimate", "invariant". @throws std::invalid_argument naming the text.
+SlamConsistency parse_slam_consistency(std::string_view name);
+
+/// A point whose place in world is known beforehand: it gives the scale and ties the world.
+struct KnownLandmark {
+  std::int64_t id = -1;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in world [m]
+  double sigma = 0.001;                                ///< of each coordinate [m]
+};
+
+/// Which features the map has.
+struct SlamMapOptions {
+  int max_features = 100;             ///< in the map; bounds memory and time
+  int max_measured = 50;              ///< in one frame: the most informative ones of those in view
+  int min_visible = 40;               ///< fewer measured: features are added
+  int max_added = 20;                 ///< in one frame (the first frame fills up to min_visible)
+  int grid_columns = 8;               ///< the picture's cells, over which new features are spread
+  int grid_rows = 6;                  ///< the same
+  double min_separation_px = 12;      ///< of a new feature from those in the map
+  double border_px = 2;               ///< predicted nearer to the border: not expected to be seen
+  double inverse_depth = 0.3;         ///< of a new feature (rho_0) [1/m]
+  double sigma_inverse_depth = 0.3;   ///< its deviation (sigma_rho); 0 must lie well within 2 sigma [1/m]
+  bool depth_from_neighbours = true;  ///< rho_0 of a new feature is the median of those that are known; its deviation
+                                      ///< grows with it
+  double max_linearity_index = 0.1;   ///< below it a feature becomes XYZ (inverse_depth.hpp); 0: never
+  int delete_after_tries = 10;        ///< frames in which it was expected, before it is judged
+  double delete_below_ratio = 0.5;    ///< measured in less than this share of them: deleted
+
+  /// @throws std::invalid_argument naming the field and its value.
+  void check() const;
+};
+
+/// Which measurements are believed.
+struct SlamAssociationOptions {
+  double gate_probability = 0.95;    ///< of a right measurement to pass: chi-square of 2
+  bool ransac = true;                ///< hypotheses from one measurement each; without it the gate alone
+  double ransac_probability = 0.99;  ///< of having tried one right measurement at least
+  int max_hypotheses = 50;
+  std::uint64_t seed = 1;  ///< of the draws
+
+  /// @throws std::invalid_argument naming the field and its value.
+  void check() const;
+};
+
+struct SlamOptions {
+  SlamMotion motion = SlamMotion::kConstantVelocity;
+  SlamConsistency consistency = SlamConsistency::kInvariant;
+  SlamPrecision precision = SlamPrecision::kDouble;
+  /// K with distortion, the pose in body and the clock. Without an IMU body is what moves smoothly; T_body_camera may
+  /// be the identity.
+  CameraCalibration camera;
+  std::int32_t camera_index = 0;  ///< which frames are ours
+
+  // Start. Camera alone: as it is given. With an IMU only position and heading are; tilt, velocity and biases are
+  // found.
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of body in world (X_cam) [m]
+  /// (X_cam_rotation). The default lets a camera with T_body_camera = I look along x of a world with z up.
+  Eigen::Quaterniond q_world_body{0.5, -0.5, 0.5, -0.5};
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< in world (X_cam_velocity) [m/s]
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< in body (X_cam_angular_velocity) [rad/s]
+  double sigma_position = 0;                                   ///< [m]; 0: world is where the camera began
+  double sigma_orientation = 0;                                ///< [rad]
+  double sigma_velocity = 0.5;                                 ///< root of P_velocity [m/s]
+  double sigma_angular_velocity = 0.5;                         ///< root of P_angular [rad/s]
+
+  // Q: continuous densities.
+  double acceleration_density = 1;          ///< camera alone [m/s^2/sqrt(Hz)]
+  double angular_acceleration_density = 1;  ///< camera alone [rad/s^2/sqrt(Hz)]
+  ImuNoise imu_noise;                       ///< with an IMU; biases begin with its deviations
+  double gravity = 9.80665;                 ///< [m/s^2]
+
+  // R.
+  double sigma_px = 1;          ///< deviation of one coordinate, of frames that do not say
+  bool override_sigma = false;  ///< sigma_px also in place of what frames say
+
+  bool estimate_extrinsics = false;        ///< T_body_camera is part of the state
+  double sigma_extrinsic_rotation = 0.01;  ///< [rad]
+  double sigma_extrinsic_position = 0.01;  ///< [m]
+  bool estimate_time_offset = false;       ///< so is camera.time_offset_s
+  double sigma_time_offset = 0.005;        ///< [s]
+
+  std::vector<KnownLandmark> landmarks;
+  SlamMapOptions map;
+  SlamAssociationOptions association;
+
+  double max_gap_s = 1;  ///< camera alone: after a longer pause between frames the motion is unknown [s]
+
+  /// @throws std::invalid_argument naming the field and its value.
+  void check() const;
+};
+
+}  // namespace loc
