@@ -121,9 +121,19 @@ std::optional<double> FusionStart::magnetic_heading(const Eigen::Quaterniond& le
 
 FusionStartEstimate FusionStart::estimate(bool may_be_at_rest) const {
   require(over_, "FusionStart: the first samples are not there yet");
+  return estimate_of(may_be_at_rest && look_for_rest(), 0);
+}
+
+FusionStartEstimate FusionStart::estimate_still(double sigma_rate) const {
+  require(over_, "FusionStart: the first samples are not there yet");
+  require_not_negative("sigma_rate", sigma_rate);
+  return estimate_of(true, sigma_rate);
+}
+
+FusionStartEstimate FusionStart::estimate_of(bool at_rest, double sigma_rate) const {
   FusionStartEstimate out;
   out.time_ns = samples_.front().time_ns;
-  out.at_rest = may_be_at_rest && look_for_rest();
+  out.at_rest = at_rest;
   if (out.at_rest) out.state.gyroscope_bias = mean_rate(samples_);
 
   // Averaged in axes that the gyroscope keeps, so that turning does not smear gravity.
@@ -158,7 +168,7 @@ FusionStartEstimate FusionStart::estimate(bool may_be_at_rest) const {
   out.covariance.block<3, 3>(kTheta, kTheta) = R.transpose() * attitude.asDiagonal() * R;
   block(kPosition, options_.position_sigma);
   block(kVelocity, out.at_rest ? options_.still_velocity_sigma : options_.moving_velocity_sigma);
-  const double white = noise_.gyroscope_noise_density / std::sqrt(options_.duration_s);
+  const double white = std::hypot(noise_.gyroscope_noise_density / std::sqrt(options_.duration_s), sigma_rate);
   block(kGyroscopeBias, out.at_rest ? std::hypot(options_.still_bias_sigma_floor, white) : noise_.gyroscope_bias_sigma);
   block(kAccelerometerBias, noise_.accelerometer_bias_sigma);
   return out;

@@ -67,10 +67,14 @@ class FusionStart {
   /// @param may_be_at_rest false: something else says that the body moves, however calm the IMU is
   /// @throws std::invalid_argument before push() has said that it is over.
   FusionStartEstimate estimate(bool may_be_at_rest = true) const;
+  /// The same when something else (a picture) says that the body stands still on the whole, though it may shake: an
+  /// engine idles. @param sigma_rate of the mean rate, by what it cannot exclude [rad/s]
+  FusionStartEstimate estimate_still(double sigma_rate) const;
   /// Begins anew.
   void reset();
 
  private:
+  FusionStartEstimate estimate_of(bool at_rest, double sigma_rate) const;
   bool look_for_rest() const;
   std::vector<Eigen::Quaterniond> turns(const Eigen::Vector3d& bias) const;
   std::optional<double> magnetic_heading(const Eigen::Quaterniond& level,

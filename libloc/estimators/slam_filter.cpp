@@ -12,7 +12,8 @@
 namespace loc {
 namespace {
 
-constexpr int kFewest = 3;  // features in a frame that hold a pose
+constexpr int kFewest = 3;                // features in a frame that hold a pose
+constexpr double kNonlinearSigmas = 0.2;  // so far from where the Jacobians say: another iteration
 
 double root_mean_square(double sum, int count) {
   return count > 0 ? std::sqrt(sum / count) : kUnknown;
@@ -268,7 +269,7 @@ void SlamFilter::apply_update() {
   covariance_.shear(kTheta, shear_);
 }
 
-void SlamFilter::update_agreeing() {
+void SlamFilter::update_agreeing(const FeaturesMeasurement& frame) {
   if (which_.empty()) return;
   covariance_.innovate(measurements_, which_);
   residual_.clear();
@@ -277,23 +278,22 @@ void SlamFilter::update_agreeing() {
     residual_.push_back(measurement.residual[0]);
     residual_.push_back(measurement.residual[1]);
   }
-  const std::vector<char>* agrees = nullptr;
-  if (options_.association.ransac) agrees = &ransac_.run(covariance_, residual_, static_cast<std::uint64_t>(time_ns_));
+  const std::vector<char>& agrees = options_.association.ransac ? ransac_.run(covariance_, residual_, sigma_px(frame),
+                                                                              static_cast<std::uint64_t>(time_ns_))
+                                                                : ransac_.compatible(covariance_, residual_);
   accepted_.clear();
   accepted_residual_.clear();
   for (std::size_t k = 0; k < which_.size(); ++k) {
     SlamLandmark& landmark = landmarks_[static_cast<std::size_t>(which_[k])];
-    const Eigen::Vector2d r(residual_[2 * k], residual_[2 * k + 1]);
-    const bool use =
-        agrees != nullptr ? (*agrees)[k] != 0 : r.dot(landmark.innovation_cov.inverse() * r) < ransac_.gate();
-    landmark.state = use ? SlamFeatureState::kMeasured : SlamFeatureState::kRejected;
-    if (!use) continue;
-    for (int row = 0; row < 2; ++row) {
-      accepted_.push_back(static_cast<int>(2 * k) + row);
-      accepted_residual_.push_back(r[row]);
+    landmark.state = agrees[k] != 0 ? SlamFeatureState::kMeasured : SlamFeatureState::kRejected;
+    if (agrees[k] == 0) continue;
+    for (std::size_t row = 2 * k; row < 2 * k + 2; ++row) {
+      accepted_.push_back(static_cast<int>(row));
+      accepted_residual_.push_back(residual_[row]);
     }
   }
   if (accepted_.empty()) return;
+  iterate(frame);
   if (!covariance_.update(accepted_, accepted_residual_, dx_, nis_)) {
     ++failed_updates_;
     for (SlamLandmark& landmark : landmarks_) {
@@ -306,6 +306,61 @@ void SlamFilter::update_agreeing() {
   apply_update();
 }
 
+// Iterated update: where the correction is so large that pixels do not go where the Jacobians say, these are taken at
+// the corrected state, and the residual is that of the prior in their terms: r = z - h(x_i) + H_i (x_i - x_0).
+// Source: B. Bell, F. Cathey, "The iterated Kalman filter update as a Gauss-Newton method", IEEE TAC 38, 1993.
+void SlamFilter::iterate(const FeaturesMeasurement& frame) {
+  const SlamState prior = state_;
+  for (int i = 1; i < options_.max_iterations; ++i) {
+    if (!covariance_.correction(accepted_, accepted_residual_, dx_)) return;
+    for (std::size_t k = 0; k < landmarks_.size(); ++k) {
+      SlamLandmark& landmark = landmarks_[k];
+      if (i == 1) points_before_[k] = landmark.point;
+      landmark.point = points_before_[k];
+      landmark.point.boxplus(dx_.segment(landmark.offset, landmark.point.dim()));
+    }
+    state_ = prior;
+    boxplus(state_, layout_, dx_);
+    double worst = 0;
+    bool good = true;
+    for (std::size_t k = 0; k < accepted_.size() && good; k += 2) {
+      const auto row = static_cast<std::size_t>(accepted_[k]);
+      const auto at = static_cast<std::size_t>(which_[row / 2]);
+      const BlockMeasurement& m = measurements_[at];
+      const auto now = predict(state_, camera_, landmarks_[at].point);
+      good = now.has_value();
+      if (!good) break;
+      const Eigen::Vector2d& z = frame.features[static_cast<std::size_t>(landmarks_[at].observation)].pixel_px;
+      const Eigen::Vector2d linear = Eigen::Vector2d(accepted_residual_[k], accepted_residual_[k + 1]) - moved_by(m);
+      worst = std::max(worst, (z - *now - linear).norm());
+    }
+    const bool again = good && worst > kNonlinearSigmas * sigma_px(frame);
+    if (again) {
+      for (std::size_t k = 0; k < accepted_.size() && good; k += 2) {
+        const auto at = static_cast<std::size_t>(which_[static_cast<std::size_t>(accepted_[k]) / 2]);
+        BlockMeasurement& m = measurements_[at];
+        const Eigen::Vector2d& z = frame.features[static_cast<std::size_t>(landmarks_[at].observation)].pixel_px;
+        good = linearise(landmarks_[at], z, m);
+        const Eigen::Vector2d r = m.residual.head<2>() + moved_by(m);
+        accepted_residual_[k] = r[0];
+        accepted_residual_[k + 1] = r[1];
+      }
+      covariance_.innovate(measurements_, which_);
+    }
+    // x_0 again: the update takes it to where it belongs.
+    state_ = prior;
+    for (std::size_t k = 0; k < landmarks_.size(); ++k) landmarks_[k].point = points_before_[k];
+    if (!again || !good) return;
+    ++frame_.iterations;
+  }
+}
+
+// H dx
+Eigen::Vector2d SlamFilter::moved_by(const BlockMeasurement& m) const {
+  return m.head.topLeftCorner(2, layout_.dim).lazyProduct(dx_.head(layout_.dim)) +
+         m.block_jacobian.topLeftCorner(2, m.block_dim).lazyProduct(dx_.segment(m.block, m.block_dim));
+}
+
 void SlamFilter::rescue(const FeaturesMeasurement& frame) {
   which_.clear();
   for (const int i : candidates_) {
@@ -314,26 +369,35 @@ void SlamFilter::rescue(const FeaturesMeasurement& frame) {
     BlockMeasurement& measurement = measurements_[static_cast<std::size_t>(i)];
     const Eigen::Vector2d& pixel = frame.features[static_cast<std::size_t>(landmark.observation)].pixel_px;
     if (!linearise(landmark, pixel, measurement)) continue;
-    const Eigen::Matrix2d s = covariance_.innovation_cov(measurement).topLeftCorner<2, 2>();
-    const Eigen::Vector2d r = measurement.residual.head<2>();
-    if (!(r.dot(s.inverse() * r) < ransac_.gate())) continue;
     which_.push_back(i);
   }
   if (which_.empty()) return;
   covariance_.innovate(measurements_, which_);
+  residual_.clear();
+  for (const int i : which_) {
+    const BlockMeasurement& measurement = measurements_[static_cast<std::size_t>(i)];
+    residual_.push_back(measurement.residual[0]);
+    residual_.push_back(measurement.residual[1]);
+  }
+  const std::vector<char>& compatible = ransac_.compatible(covariance_, residual_);
   accepted_.clear();
   accepted_residual_.clear();
   for (std::size_t k = 0; k < which_.size(); ++k) {
-    for (int row = 0; row < 2; ++row) {
-      accepted_.push_back(static_cast<int>(2 * k) + row);
-      accepted_residual_.push_back(measurements_[static_cast<std::size_t>(which_[k])].residual[row]);
+    if (compatible[k] == 0) continue;
+    for (std::size_t row = 2 * k; row < 2 * k + 2; ++row) {
+      accepted_.push_back(static_cast<int>(row));
+      accepted_residual_.push_back(residual_[row]);
     }
   }
+  if (accepted_.empty()) return;
   if (!covariance_.update(accepted_, accepted_residual_, dx_, nis_)) {
     ++failed_updates_;
     return;
   }
-  for (const int i : which_) landmarks_[static_cast<std::size_t>(i)].state = SlamFeatureState::kRescued;
+  for (std::size_t k = 0; k < accepted_.size(); k += 2) {
+    const auto i = static_cast<std::size_t>(which_[static_cast<std::size_t>(accepted_[k]) / 2]);
+    landmarks_[i].state = SlamFeatureState::kRescued;
+  }
   frame_.nis += nis_;
   frame_.nis_dim += static_cast<int>(accepted_.size());
   apply_update();
@@ -401,11 +465,12 @@ const SlamFrame& SlamFilter::update(const FeaturesMeasurement& frame) {
   frame_.counts = SlamCounts{};
   frame_.counts.in_frame = static_cast<std::int64_t>(frame.features.size());
   frame_.nis = 0;
+  frame_.iterations = 1;
   frame_.nis_dim = 0;
   bring_covariance_up();
   match(frame);
   select_measured(frame);
-  update_agreeing();
+  update_agreeing(frame);
   rescue(frame);
   judge(frame);
   const std::size_t expected = landmarks_.size();

@@ -119,7 +119,9 @@ class SlamFilter {
   void match(const FeaturesMeasurement& frame);
   void select_measured(const FeaturesMeasurement& frame);
   bool linearise(SlamLandmark& landmark, const Eigen::Vector2d& pixel_px, BlockMeasurement& out) const;
-  void update_agreeing();
+  void update_agreeing(const FeaturesMeasurement& frame);
+  void iterate(const FeaturesMeasurement& frame);
+  Eigen::Vector2d moved_by(const BlockMeasurement& measurement) const;
   void rescue(const FeaturesMeasurement& frame);
   void apply_update();
   void judge(const FeaturesMeasurement& frame);

@@ -54,6 +54,7 @@ struct SlamFrame : Stamp {
   double reprojection_after_px = kUnknown;   ///< the same after the update; NaN without any
   double nis = 0;                            ///< of all that was used
   int nis_dim = 0;                           ///< numbers in it
+  int iterations = 1;                        ///< of the update: more than one where it was far from linear
   SlamCounts counts;
   double time_spent_s = 0;  ///< by the filter; the only thing here that differs from run to run
   std::vector<SlamFeature> features;

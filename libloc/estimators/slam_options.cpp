@@ -60,6 +60,7 @@ void SlamAssociationOptions::check() const {
 
 void SlamOptions::check() const {
   camera.check();
+  require_at_least("max_iterations", max_iterations, 1);
   require(camera_index >= 0, "camera_index", camera_index, "must not be negative");
   require(position.allFinite() && velocity.allFinite() && angular_velocity.allFinite(),
           "position, velocity and angular_velocity must be finite");
@@ -77,6 +78,18 @@ void SlamOptions::check() const {
   require_positive("sigma_extrinsic_position", sigma_extrinsic_position);
   require_positive("sigma_time_offset", sigma_time_offset);
   require_positive("max_gap_s", max_gap_s);
+  start.check();
+  stand_still.check();
+  require_positive("zero_velocity_sigma", zero_velocity_sigma);
+  require_positive("zero_rate_sigma_floor", zero_rate_sigma_floor);
+  require_positive("still_picture_px", still_picture_px);
+  require_positive("max_imu_step_s", max_imu_step_s);
+  require(max_imu_bridge_s >= max_imu_step_s, "max_imu_bridge_s", max_imu_bridge_s, "is below max_imu_step_s");
+  require_positive("gap_acceleration_sigma", gap_acceleration_sigma);
+  require_positive("gap_angular_velocity_sigma", gap_angular_velocity_sigma);
+  require_positive("max_angular_velocity", max_angular_velocity);
+  require_positive("max_specific_force", max_specific_force);
+  require_positive("lost_after_s", lost_after_s);
   map.check();
   association.check();
   require(landmarks.size() <= static_cast<std::size_t>(map.max_features),

@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "libloc/core/time.hpp"
+#include "libloc/estimators/fusion_start.hpp"
+#include "libloc/estimators/stand_still.hpp"
 #include "libloc/sensors/imu_noise.hpp"
 #include "libloc/sensors/rig.hpp"
 
@@ -81,6 +83,7 @@ struct SlamOptions {
   SlamMotion motion = SlamMotion::kConstantVelocity;
   SlamConsistency consistency = SlamConsistency::kInvariant;
   SlamPrecision precision = SlamPrecision::kDouble;
+  int max_iterations = 3;  ///< of an update that is far from linear; 1: plain EKF
   /// K with distortion, the pose in body and the clock. Without an IMU body is what moves smoothly; T_body_camera may
   /// be the identity.
   CameraCalibration camera;
@@ -119,6 +122,21 @@ struct SlamOptions {
   SlamAssociationOptions association;
 
   double max_gap_s = 1;  ///< camera alone: after a longer pause between frames the motion is unknown [s]
+
+  // With an IMU.
+  FusionStartOptions start;                 ///< from rest
+  StandStillOptions stand_still;            ///< when the body rests
+  bool zero_velocity = true;                ///< the velocity is zero while IMU and picture stand still
+  double zero_velocity_sigma = 0.02;        ///< [m/s]
+  double zero_rate_sigma_floor = 1e-4;      ///< what a body at rest may turn, earth rate included [rad/s]
+  double still_picture_px = 1.5;            ///< features move less from frame to frame: the picture stands still [px]
+  double max_imu_step_s = 0.1;              ///< a longer step is a gap: bridged with more noise … [s]
+  double max_imu_bridge_s = 1;              ///< … up to here; beyond it a new start [s]
+  double gap_acceleration_sigma = 3;        ///< what the body may do in a gap [m/s^2]
+  double gap_angular_velocity_sigma = 0.5;  ///< the same [rad/s]
+  double max_angular_velocity = 70;         ///< A sample with more is an error of the sensor: skipped. [rad/s]
+  double max_specific_force = 500;          ///< The same. [m/s^2]
+  double lost_after_s = 0.5;                ///< without a frame of enough features: estimates say so (kFewFeatures) [s]
 
   /// @throws std::invalid_argument naming the field and its value.
   void check() const;

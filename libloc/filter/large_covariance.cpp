@@ -37,7 +37,7 @@ LargeCovariance<Scalar>::LargeCovariance(int head_dim, int capacity, int max_row
   s_.resize(size(max_rows_, max_rows_));
   chol_.resize(size(max_rows_, max_rows_));
   h_.resize(size(kMaxHeadDim, max_rows_));
-  work_.resize(size(leading_, 2 * kMaxHeadDim));
+  work_.resize(size(leading_ + max_rows_, 2 * kMaxHeadDim));
 }
 
 template <class Scalar>
@@ -291,6 +291,49 @@ void LargeCovariance<Scalar>::innovate(std::span<const BlockMeasurement> measure
   }
 }
 
+// Cholesky factor of the accepted rows of S.
+template <class Scalar>
+bool LargeCovariance<Scalar>::factorise(std::span<const int> accepted) {
+  const int m = static_cast<int>(accepted.size());
+  for (int j = 0; j < m; ++j) {
+    const int from = accepted[static_cast<std::size_t>(j)];
+    for (int i = j; i < m; ++i) {
+      chol_[size(max_rows_, j) + static_cast<std::size_t>(i)] =
+          s_[size(max_rows_, from) + static_cast<std::size_t>(accepted[static_cast<std::size_t>(i)])];
+    }
+  }
+  return blas::cholesky_lower(m, chol_.data(), max_rows_);
+}
+
+template <class Scalar>
+bool LargeCovariance<Scalar>::correction(std::span<const int> accepted, std::span<const double> residual,
+                                         Eigen::VectorXd& dx) {
+  const int m = static_cast<int>(accepted.size());
+  dx.setZero(dim_);
+  if (m == 0) return true;
+  if (!factorise(accepted)) return false;
+  const auto l = [&](int i, int k) { return chol_[size(max_rows_, k) + static_cast<std::size_t>(i)]; };
+  // L L^T y = r, scattered to all rows of PHt.
+  Scalar* const y = work_.data();
+  Scalar* const all = work_.data() + size(leading_, kMaxHeadDim);
+  for (int i = 0; i < m; ++i) {
+    auto sum = static_cast<Scalar>(residual[static_cast<std::size_t>(i)]);
+    for (int k = 0; k < i; ++k) sum -= l(i, k) * y[k];
+    y[i] = sum / l(i, i);
+  }
+  std::fill_n(all, rows_, Scalar(0));
+  for (int i = m - 1; i >= 0; --i) {
+    for (int k = i + 1; k < m; ++k) y[i] -= l(k, i) * y[k];
+    y[i] /= l(i, i);
+    all[accepted[static_cast<std::size_t>(i)]] = y[i];
+  }
+  Scalar* const out = all + rows_;
+  blas::gemm(Transpose::kNo, Transpose::kNo, dim_, 1, rows_, Scalar(1), pht_.data(), leading_, all, rows_, Scalar(0),
+             out, leading_);
+  for (int i = 0; i < dim_; ++i) dx[i] = static_cast<double>(out[i]);
+  return true;
+}
+
 template <class Scalar>
 bool LargeCovariance<Scalar>::update(std::span<const int> accepted, std::span<const double> residual,
                                      Eigen::VectorXd& dx, double& nis) {
@@ -298,15 +341,10 @@ bool LargeCovariance<Scalar>::update(std::span<const int> accepted, std::span<co
   dx.setZero(dim_);
   nis = 0;
   if (m == 0) return true;
+  if (!factorise(accepted)) return false;
   for (int j = 0; j < m; ++j) {
-    const int from = accepted[static_cast<std::size_t>(j)];
-    for (int i = j; i < m; ++i) {
-      chol_[size(max_rows_, j) + static_cast<std::size_t>(i)] =
-          s_[size(max_rows_, from) + static_cast<std::size_t>(accepted[static_cast<std::size_t>(i)])];
-    }
-    std::copy_n(pht_.data() + index(0, from), dim_, gain_.data() + index(0, j));
+    std::copy_n(pht_.data() + index(0, accepted[static_cast<std::size_t>(j)]), dim_, gain_.data() + index(0, j));
   }
-  if (!blas::cholesky_lower(m, chol_.data(), max_rows_)) return false;
   blas::solve_right_lower_transposed(dim_, m, chol_.data(), max_rows_, gain_.data(), leading_);
   // y = L^-1 r
   Scalar* const y = work_.data();
@@ -316,10 +354,10 @@ bool LargeCovariance<Scalar>::update(std::span<const int> accepted, std::span<co
     y[i] = sum / chol_[size(max_rows_, i) + static_cast<std::size_t>(i)];
     nis += static_cast<double>(y[i]) * static_cast<double>(y[i]);
   }
-  Scalar* const correction = work_.data() + size(leading_, kMaxHeadDim);
-  blas::gemm(Transpose::kNo, Transpose::kNo, dim_, 1, m, Scalar(1), gain_.data(), leading_, y, m, Scalar(0), correction,
+  Scalar* const change = work_.data() + size(leading_, kMaxHeadDim);
+  blas::gemm(Transpose::kNo, Transpose::kNo, dim_, 1, m, Scalar(1), gain_.data(), leading_, y, m, Scalar(0), change,
              leading_);
-  for (int i = 0; i < dim_; ++i) dx[i] = static_cast<double>(correction[i]);
+  for (int i = 0; i < dim_; ++i) dx[i] = static_cast<double>(change[i]);
   blas::syrk_lower(dim_, m, Scalar(-1), gain_.data(), leading_, p_.data(), leading_);
   mirror_head();
   return true;

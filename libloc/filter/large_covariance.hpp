@@ -97,6 +97,9 @@ class LargeCovariance {
   /// Entry of PHt, of the last innovate().
   double pht(int row, int column) const { return static_cast<double>(pht_[index(row, column)]); }
 
+  /// The correction that update() would make, P untouched: for iterated updates. @returns false as update().
+  bool correction(std::span<const int> accepted, std::span<const double> residual, Eigen::VectorXd& dx);
+
   /// Takes rows of the last innovate() for true. @param accepted the rows that are used, ascending @param residual of
   /// these rows @param dx dim() long @param nis r^T S^-1 r of these rows
   /// @returns false, and leaves P as it is, when their S is not positive definite.
@@ -114,6 +117,7 @@ class LargeCovariance {
     return static_cast<std::size_t>(column) * static_cast<std::size_t>(leading_) + static_cast<std::size_t>(row);
   }
   void mirror_head();
+  bool factorise(std::span<const int> accepted);
 
   int head_;
   int capacity_;

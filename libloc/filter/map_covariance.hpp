@@ -71,6 +71,9 @@ class MapCovariance {
   double s(int row, int column) const {
     return visit([&](const auto& p) { return p.s(row, column); });
   }
+  bool correction(std::span<const int> accepted, std::span<const double> residual, Eigen::VectorXd& dx) {
+    return visit([&](auto& p) { return p.correction(accepted, residual, dx); });
+  }
   bool update(std::span<const int> accepted, std::span<const double> residual, Eigen::VectorXd& dx, double& nis) {
     return visit([&](auto& p) { return p.update(accepted, residual, dx, nis); });
   }

@@ -1,0 +1,108 @@
+// SLAM with one camera and an IMU: metres, gravity, and a world with z up. The IMU carries the state from frame to
+// frame (filter/imu_propagation.hpp), the tracks of features correct it; slam_filter.hpp has the filter.
+//
+// Start: from rest by the first second (fusion_start.hpp); from motion by a window of samples and tracks
+// (slam_start.hpp). What came in the meantime is used then: the first estimate comes late, frames() has all frames.
+// Frames: world has z up; heading 0 is where so3::heading of the body was at the start, the place is options.position.
+// Clocks: t_imu = t_camera + time offset. A frame waits for the IMU sample at or after its time.
+// Rest: while IMU (stand_still.hpp) and picture stand still, the velocity is zero.
+// Gaps of the IMU: up to max_imu_step_s nothing; up to max_imu_bridge_s bridged with more noise (kBridged, kGap);
+// beyond it a new start, which keeps place and heading with the uncertainty that they have by then (kReinitialised),
+// not the map. Without features the IMU goes on alone; estimates say kFewFeatures after lost_after_s.
+//
+// Not observable: place and heading of the world. Without acceleration: the scale.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "libloc/core/fifo.hpp"
+#include "libloc/estimators/estimator.hpp"
+#include "libloc/estimators/fusion_start.hpp"
+#include "libloc/estimators/slam_filter.hpp"
+#include "libloc/estimators/slam_options.hpp"
+#include "libloc/estimators/stand_still.hpp"
+
+namespace loc {
+
+class InertialSlam {
+ public:
+  /// @throws std::invalid_argument as SlamOptions::check, and for another motion model than kInertial.
+  explicit InertialSlam(const SlamOptions& options);
+
+  // Estimator concept. There is an estimate for every IMU sample after the start.
+  bool process(const Measurement& measurement);
+  Estimate estimate() const;
+  NamedCounts counts() const;
+  void reset();
+
+  bool running() const { return filter_.started(); }
+  /// Frames that the last process() has completed: usually none or one, at the start those that had waited. Their
+  /// estimates are at the frames' own times.
+  std::span<const SlamFrame> frames() const { return {frames_.data(), frame_count_}; }
+  std::vector<SlamMapPoint> map() const { return filter_.map(); }
+  const SlamFilter& filter() const { return filter_; }
+  const SlamOptions& options() const { return filter_.options(); }
+
+  SlamSnapshot snapshot() const { return filter_.snapshot(); }
+  /// Goes on from there with the next IMU sample, which may be at any time: what happened between is unknown but for a
+  /// body that went nowhere (as a gap of max_imu_bridge_s).
+  /// @throws std::invalid_argument as SlamFilter::restore.
+  void restore(const SlamSnapshot& snapshot);
+
+ private:
+  struct Carried {
+    TimeNs time_ns = kNoTime;
+    SlamState state;
+    Eigen::MatrixXd covariance;
+  };
+
+  bool process_imu(const ImuMeasurement& imu);
+  void process_frame(const FeaturesMeasurement& frame);
+  bool usable(const ImuMeasurement& imu);
+  bool start();
+  void begin(const FusionStartEstimate& from);
+  void run(const ImuMeasurement& imu);
+  void step_to(TimeNs time_ns, const ImuMeasurement& to);
+  void bridge(const ImuMeasurement& imu);
+  void start_anew();
+  void take_frame(const FeaturesMeasurement& frame);
+  double moved_px(const FeaturesMeasurement& frame);
+  bool waiting_frames_stand_still();
+  void look_for_rest(const ImuMeasurement& imu);
+  bool picture_stands_still() const { return still_frames_ >= 2; }
+  TimeNs on_imu_clock(TimeNs camera_time_ns) const;
+  void skip(const char* count, std::uint32_t status);
+
+  SlamFilter filter_;
+  FusionStart start_;
+  StandStillDetector rest_;
+  std::vector<SlamFrame> frames_;
+  std::size_t frame_count_ = 0;
+
+  Fifo<FeaturesMeasurement> waiting_;  // frames, for the IMU
+  std::vector<ImuMeasurement> early_;  // samples, for the start
+  ImuMeasurement last_imu_;            // as the filter's state is; its rate and force at the filter's time
+  Stamp last_;
+  std::optional<Carried> carried_;
+  std::vector<FeatureObservation> picture_;  // of the last frame, by identity: does it stand still?
+  std::vector<FeatureObservation> picture_before_;
+  std::vector<double> moves_;
+  int still_frames_ = 0;
+  TimeNs last_good_frame_ns_ = kNoTime;
+  TimeNs last_frame_ns_ = kNoTime;
+  TimeNs rest_used_ns_ = kNoTime;
+  bool restored_ = false;
+  int set_back_in_a_row_ = 0;
+  std::uint32_t status_ = 0;
+  std::uint32_t next_status_ = 0;
+  std::int64_t imu_used_ = 0;
+  std::int64_t frames_used_ = 0;
+  std::map<std::string, std::int64_t> counts_;
+};
+
+static_assert(Estimator<InertialSlam>);
+
+}  // namespace loc
