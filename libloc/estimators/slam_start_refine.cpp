@@ -14,6 +14,8 @@ namespace loc::slam_start {
 namespace {
 
 constexpr int kIterations = 25;
+constexpr int kPointIterations = 2;
+constexpr double kFall = 1e-3;                // of the cost, a sum of squared deviations: less is convergence
 constexpr int kMaxTries = 8;                  // of the damping, per iteration
 constexpr double kHuber = 2.4477;             // radius of 95 % of two normal values
 constexpr double kReject = 13.82;             // squared radius of 99.9 %
@@ -39,6 +41,7 @@ struct Equations {
   Eigen::VectorXd b;
   Eigen::MatrixXd by_motion;  // of the poses
   struct OfPoint {
+    double cost = 0;
     Eigen::Matrix3d V = Eigen::Matrix3d::Zero();
     Eigen::Vector3d g = Eigen::Vector3d::Zero();
     Eigen::Matrix<double, Eigen::Dynamic, 3> W;  // poses by point
@@ -53,6 +56,13 @@ struct Reduced {
   Eigen::MatrixXd Y;  // W L^-T of all points
   std::vector<Eigen::LLT<Eigen::Matrix3d>> points;
 };
+
+Point moved(const Point& point, const Eigen::Vector3d& d) {
+  Point out = point;
+  out.direction = (point.direction + tangent(point.direction) * d.head<2>()).normalized();
+  out.inverse_distance += d[2];
+  return out;
+}
 
 class Refinement {
  public:
@@ -85,12 +95,47 @@ class Refinement {
     double sum = prior_cost(x);
     for (std::size_t t = 0; t < problem_.tracks.size(); ++t) {
       if (!x.points[t].used) continue;
+      sum += squared(x.points[t].inverse_distance / kInverseDistanceSigma);
       for (const Observation& o : problem_.tracks[t].observations) {
         if (!o.used) continue;
         sum += loss(radius(poses[static_cast<std::size_t>(o.frame)], x.points[t], o).value_or(kOutside));
       }
     }
     return sum;
+  }
+
+  // Equations of one point. @param e adds to those of the poses too, unless null
+  Equations::OfPoint of_point(const Point& point, const Track& track, const std::vector<PoseModel>& poses,
+                              Equations* e) const {
+    Equations::OfPoint out;
+    if (e != nullptr) out.W.setZero(poses_, 3);
+    out.V(2, 2) = 1 / squared(kInverseDistanceSigma);
+    out.g[2] = -point.inverse_distance / squared(kInverseDistanceSigma);
+    out.cost = squared(point.inverse_distance / kInverseDistanceSigma);
+    for (const Observation& o : track.observations) {
+      if (!o.used) continue;
+      const auto frame = static_cast<std::size_t>(o.frame);
+      const auto model = pixel_model(problem_, poses[frame].rotation, poses[frame].position, point);
+      if (!model) {
+        out.cost += loss(kOutside);
+        continue;
+      }
+      const double sigma = problem_.sigma_px[frame] * ratio_;
+      const Eigen::Vector2d residual = o.pixel_px - model->pixel_px;
+      const double radius = residual.squaredNorm() / squared(sigma);
+      out.cost += loss(radius);
+      const double weight = huber_weight(radius) / squared(sigma);
+      const Eigen::Matrix<double, 3, 2> by_point = weight * model->by_point.transpose();
+      out.V += by_point * model->by_point;
+      out.g += by_point * residual;
+      if (e == nullptr || o.frame == 0) continue;
+      const Eigen::Index at = 6 * (o.frame - 1);
+      const Eigen::Matrix<double, 6, 2> by_pose = weight * model->by_pose.transpose();
+      e->U.block<6, 6>(at, at) += by_pose * model->by_pose;
+      e->b.segment<6>(at) += by_pose * residual;
+      out.W.middleRows<6>(at) += by_pose * model->by_point;
+    }
+    return out;
   }
 
   Equations linearise(const Unknowns& x) const {
@@ -106,33 +151,8 @@ class Refinement {
     e.points.resize(x.points.size());
     for (std::size_t t = 0; t < problem_.tracks.size(); ++t) {
       if (!x.points[t].used) continue;
-      Equations::OfPoint& point = e.points[t];
-      point.W.setZero(poses_, 3);
-      point.V(2, 2) = 1 / squared(kInverseDistanceSigma);
-      point.g[2] = -x.points[t].inverse_distance / squared(kInverseDistanceSigma);
-      for (const Observation& o : problem_.tracks[t].observations) {
-        if (!o.used) continue;
-        const auto frame = static_cast<std::size_t>(o.frame);
-        const auto model = pixel_model(problem_, poses[frame].rotation, poses[frame].position, x.points[t]);
-        if (!model) {
-          e.cost += loss(kOutside);
-          continue;
-        }
-        const double sigma = problem_.sigma_px[frame] * ratio_;
-        const Eigen::Vector2d residual = o.pixel_px - model->pixel_px;
-        const double radius = residual.squaredNorm() / squared(sigma);
-        e.cost += loss(radius);
-        const double weight = huber_weight(radius) / squared(sigma);
-        const Eigen::Matrix<double, 3, 2> by_point = weight * model->by_point.transpose();
-        point.V += by_point * model->by_point;
-        point.g += by_point * residual;
-        if (o.frame == 0) continue;
-        const Eigen::Index at = 6 * (o.frame - 1);
-        const Eigen::Matrix<double, 6, 2> by_pose = weight * model->by_pose.transpose();
-        e.U.block<6, 6>(at, at) += by_pose * model->by_pose;
-        e.b.segment<6>(at) += by_pose * residual;
-        point.W.middleRows<6>(at) += by_pose * model->by_point;
-      }
+      e.points[t] = of_point(x.points[t], problem_.tracks[t], poses, &e);
+      e.cost += e.points[t].cost;
     }
     return e;
   }
@@ -192,12 +212,27 @@ class Refinement {
       const auto& factor = reduced.points[t];
       const auto Y = reduced.Y.middleCols<3>(3 * static_cast<Eigen::Index>(t));
       const Eigen::Vector3d right = factor.matrixL().solve(e.points[t].g) - Y.transpose() * pose;
-      const Eigen::Vector3d d = factor.matrixU().solve(right);
-      Point& point = out.points[t];
-      point.direction = (point.direction + tangent(point.direction) * d.head<2>()).normalized();
-      point.inverse_distance += d[2];
+      out.points[t] = moved(x.points[t], factor.matrixU().solve(right));
     }
+    settle_points(out);
     return out;
+  }
+
+  // Each point by itself to its least cost, poses given. Velocity and inverse distances enter as products: without this
+  // the way to another scale is a narrow bent valley.
+  void settle_points(Unknowns& x) const {
+    const std::vector<PoseModel> poses = pose_models(problem_, x);
+    for (std::size_t t = 0; t < x.points.size(); ++t) {
+      if (!x.points[t].used) continue;
+      Equations::OfPoint now = of_point(x.points[t], problem_.tracks[t], poses, nullptr);
+      for (int i = 0; i < kPointIterations; ++i) {
+        const Point next = moved(x.points[t], now.V.llt().solve(now.g));
+        Equations::OfPoint after = of_point(next, problem_.tracks[t], poses, nullptr);
+        if (!(after.cost < now.cost)) break;
+        x.points[t] = next;
+        now = std::move(after);
+      }
+    }
   }
 
   // @returns whether it converged; x is at the least cost.
@@ -217,7 +252,7 @@ class Refinement {
             const double fall = e.cost - after;
             x = next;
             damping = std::max(damping * 0.1, 1e-12);
-            if (fall <= 1e-4 + 1e-6 * e.cost) return true;
+            if (fall <= kFall * (1 + 1e-3 * e.cost)) return true;
             continue;
           }
         }
@@ -238,9 +273,6 @@ class Refinement {
     double sum = x.noise.dot(pose_information_ * x.noise);
     sum += prior_.segment<3>(kStartGyroscopeBias).dot(x.gyroscope_bias.cwiseAbs2());
     sum += prior_.segment<3>(kStartAccelerometerBias).dot(x.accelerometer_bias.cwiseAbs2());
-    for (const Point& point : x.points) {
-      if (point.used) sum += squared(point.inverse_distance / kInverseDistanceSigma);
-    }
     return sum;
   }
   double loss(double radius) const {
