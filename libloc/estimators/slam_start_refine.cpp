@@ -82,28 +82,6 @@ class Refinement {
     return true;
   }
 
-  // Squared radius of an observation in deviations; nullopt without projection.
-  std::optional<double> radius(const PoseModel& pose, const Point& point, const Observation& o) const {
-    const auto model = pixel_model(problem_, pose.rotation, pose.position, point);
-    if (!model) return std::nullopt;
-    const double sigma = problem_.sigma_px[static_cast<std::size_t>(o.frame)] * ratio_;
-    return (o.pixel_px - model->pixel_px).squaredNorm() / squared(sigma);
-  }
-
-  double cost(const Unknowns& x) const {
-    const std::vector<PoseModel> poses = pose_models(problem_, x);
-    double sum = prior_cost(x);
-    for (std::size_t t = 0; t < problem_.tracks.size(); ++t) {
-      if (!x.points[t].used) continue;
-      sum += squared(x.points[t].inverse_distance / kInverseDistanceSigma);
-      for (const Observation& o : problem_.tracks[t].observations) {
-        if (!o.used) continue;
-        sum += loss(radius(poses[static_cast<std::size_t>(o.frame)], x.points[t], o).value_or(kOutside));
-      }
-    }
-    return sum;
-  }
-
   // Equations of one point. @param e adds to those of the poses too, unless null
   Equations::OfPoint of_point(const Point& point, const Track& track, const std::vector<PoseModel>& poses,
                               Equations* e) const {
@@ -138,8 +116,7 @@ class Refinement {
     return out;
   }
 
-  Equations linearise(const Unknowns& x) const {
-    const std::vector<PoseModel> poses = pose_models(problem_, x);
+  Equations linearise(const Unknowns& x, const std::vector<PoseModel>& poses) const {
     Equations e;
     e.cost = prior_cost(x);
     e.U.setZero(poses_, poses_);
@@ -214,14 +191,14 @@ class Refinement {
       const Eigen::Vector3d right = factor.matrixL().solve(e.points[t].g) - Y.transpose() * pose;
       out.points[t] = moved(x.points[t], factor.matrixU().solve(right));
     }
-    settle_points(out);
     return out;
   }
 
   // Each point by itself to its least cost, poses given. Velocity and inverse distances enter as products: without this
   // the way to another scale is a narrow bent valley.
-  void settle_points(Unknowns& x) const {
-    const std::vector<PoseModel> poses = pose_models(problem_, x);
+  // @returns the cost of all
+  double settle_points(Unknowns& x, const std::vector<PoseModel>& poses) const {
+    double cost = prior_cost(x);
     for (std::size_t t = 0; t < x.points.size(); ++t) {
       if (!x.points[t].used) continue;
       Equations::OfPoint now = of_point(x.points[t], problem_.tracks[t], poses, nullptr);
@@ -232,27 +209,30 @@ class Refinement {
         x.points[t] = next;
         now = std::move(after);
       }
+      cost += now.cost;
     }
+    return cost;
   }
 
   // @returns whether it converged; x is at the least cost.
   bool descend(Unknowns& x, int& iterations) const {
     double damping = 1e-4;
+    std::vector<PoseModel> poses = pose_models(problem_, x);
     for (int i = 0; i < kIterations; ++i) {
       ++iterations;
-      const Equations e = linearise(x);
+      const Equations e = linearise(x, poses);
       bool better = false;
       for (int tries = 0; tries < kMaxTries && !better; ++tries) {
-        const auto reduced = reduce(e, x, damping);
-        if (reduced) {
-          const Unknowns next = step(e, *reduced, x);
-          const double after = cost(next);
+        if (const auto reduced = reduce(e, x, damping)) {
+          Unknowns next = step(e, *reduced, x);
+          std::vector<PoseModel> next_poses = pose_models(problem_, next);
+          const double after = settle_points(next, next_poses);
           if (after <= e.cost) {
             better = true;
-            const double fall = e.cost - after;
-            x = next;
+            x = std::move(next);
+            poses = std::move(next_poses);
             damping = std::max(damping * 0.1, 1e-12);
-            if (fall <= kFall * (1 + 1e-3 * e.cost)) return true;
+            if (e.cost - after <= kFall * (1 + 1e-3 * e.cost)) return true;
             continue;
           }
         }
@@ -373,7 +353,7 @@ double median_parallax(const Problem& problem, const Unknowns& x) {
 }
 
 bool judge(const Problem& problem, const Refinement& refinement, Refined& out) {
-  const Equations e = refinement.linearise(out.x);
+  const Equations e = refinement.linearise(out.x, pose_models(problem, out.x));
   const auto reduced = refinement.reduce(e, out.x, 0);
   if (!reduced) return false;
   const Eigen::Index size = reduced->rhs.size();
@@ -509,7 +489,6 @@ std::optional<Refined> refine(Problem& problem, const Eigen::Vector3d& gyroscope
     refinement.set_ratio(ratio);
     refinement.set_robust(false);
     if (settled) break;
-    if (!refinement.weigh_poses(x)) return std::nullopt;
     out.converged = refinement.descend(x, out.iterations);
   }
   census = examine(problem, x, refinement.ratio(), false);
