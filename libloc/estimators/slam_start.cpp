@@ -14,6 +14,9 @@ namespace {
 
 constexpr std::size_t kMaxSamples = 50'000;  // of the IMU in the window
 constexpr std::size_t kMaxWindow = 2'000;    // frames in it
+constexpr double kMuchParallax = 25;         // in deviations: one minimum is likely the only one
+constexpr double kSameCost = 1;              // difference of two results' costs that makes them one minimum
+constexpr double kLargeRatio = 1.2;          // of residuals to what is stated
 
 void require_count(std::string_view name, int value, int least) {
   require(value >= least, name, value, "must be at least " + std::to_string(least));
@@ -270,14 +273,35 @@ std::optional<SlamStartEstimate> SlamStart::solve() {
     return refuse(Outcome::kNoParallax, "half of the features have a parallax of less than " + text(parallax) +
                                             " deviations of an observation: the camera rests or only turns");
   };
-  const double beside_rotation = slam_start::parallax_beside_rotation(problem);
-  if (beside_rotation < options_.min_parallax) return no_parallax(beside_rotation);
+  const slam_start::RotationOnly turning = slam_start::rotation_only(problem);
+  if (turning.parallax < options_.min_parallax) return no_parallax(turning.parallax);
+  const auto attempt = [&](const Eigen::Vector3d& bias) -> std::optional<slam_start::Refined> {
+    const auto start = slam_start::closed_form(problem, bias);
+    if (!start) return std::nullopt;
+    return slam_start::refine(problem, bias, *start);
+  };
   const Eigen::Vector3d bias = slam_start::epipolar_gyroscope_bias(problem);
-  if (!bias.allFinite()) return refuse(Outcome::kNoSolution, "the turns between the frames have no solution");
-  const auto start = slam_start::closed_form(problem, bias);
-  if (!start) return refuse(Outcome::kNoParallax, "velocity, gravity and points have no solution: no parallax");
-  const auto refined = slam_start::refine(problem, bias, *start);
+  auto refined = bias.allFinite() ? attempt(bias) : std::nullopt;
+  // With little parallax, turning and moving sideways look alike, and there are several minima.
+  if (!refined || refined->parallax < kMuchParallax || refined->sigma_ratio > kLargeRatio) {
+    bool agree = refined.has_value();
+    const auto consider = [&](const Eigen::Vector3d& other) {
+      auto second = attempt(other);
+      agree = agree && second && std::abs(second->cost - refined->cost) < kSameCost;
+      if (second && (!refined || second->cost < refined->cost)) refined = std::move(second);
+    };
+    consider(turning.gyroscope_bias);
+    consider(Eigen::Vector3d::Zero());
+    if (refined && !agree) {
+      // Once more without the outliers that were found.
+      problem.tracks = refined->tracks;
+      consider(slam_start::epipolar_gyroscope_bias(problem));
+      consider(Eigen::Vector3d::Zero());
+      consider(refined->x.gyroscope_bias);
+    }
+  }
   if (!refined) return refuse(Outcome::kNoSolution, "the least squares of the pixels have no solution");
+  problem.tracks = std::move(refined->tracks);
   const slam_start::Unknowns& x = refined->x;
 
   if (refined->features < options_.min_features) return few(static_cast<std::size_t>(refined->features));

@@ -62,9 +62,13 @@ Eigen::MatrixXd pose_covariance(const Problem& problem, const Eigen::Vector3d& g
 /// Marks observations that jump away from where their neighbours in the track let expect them.
 void mark_jumps(Problem& problem);
 
-/// What a camera that only turns leaves unexplained, whatever the gyroscope's bias: the median over the tracks of the
+/// The gyroscope's bias that explains most by turning alone, and what that leaves: the median over the tracks of the
 /// largest angle between rays, in deviations of a ray.
-double parallax_beside_rotation(const Problem& problem);
+struct RotationOnly {
+  Eigen::Vector3d gyroscope_bias;
+  double parallax;
+};
+RotationOnly rotation_only(const Problem& problem);
 
 /// Step (1). @returns rad/s; not finite when the frames tell nothing.
 Eigen::Vector3d epipolar_gyroscope_bias(const Problem& problem);
@@ -132,11 +136,13 @@ struct Refined {
   double condition = 0;
   double scale_sigma = 0;
   double parallax = 0;  ///< median over the features of the largest, in deviations
+  double cost = 0;      ///< over all observations, squared deviations as stated, each bounded: to compare minima by
   double behind = 0;    ///< share of the features whose inverse distance is negative by three deviations
   Eigen::Matrix<double, kStartDim, kStartDim> covariance;
   std::vector<double> inverse_distance_sigma;  ///< of each point
+  std::vector<Track> tracks;                   ///< as marked
 };
-/// Step (3); marks outliers in the problem. nullopt when a factorisation fails or too few observations are left.
-std::optional<Refined> refine(Problem& problem, const Eigen::Vector3d& gyroscope_bias, const ClosedForm& start);
+/// Step (3). nullopt when a factorisation fails or too few observations are left.
+std::optional<Refined> refine(Problem problem, const Eigen::Vector3d& gyroscope_bias, const ClosedForm& start);
 
 }  // namespace loc::slam_start

@@ -157,7 +157,7 @@ void mark_jumps(Problem& problem) {
   }
 }
 
-double parallax_beside_rotation(const Problem& problem) {
+RotationOnly rotation_only(const Problem& problem) {
   const double sigma = problem.ray_sigma();
   const double prior = 1 / (problem.gyroscope_bias_sigma * problem.gyroscope_bias_sigma);
   Eigen::Vector3d bias = Eigen::Vector3d::Zero();
@@ -180,7 +180,7 @@ double parallax_beside_rotation(const Problem& problem) {
       all.insert(all.end(), of_track.begin(), of_track.end());
       largest.push_back(*std::ranges::max_element(of_track));
     }
-    if (all.empty()) return 0;
+    if (all.empty()) return {bias, 0};
     parallax = median(largest) / sigma;
     const double scale = std::max(sigma, 1.2 * median(all));
     Eigen::Matrix3d H = prior * Eigen::Matrix3d::Identity();
@@ -207,7 +207,7 @@ double parallax_beside_rotation(const Problem& problem) {
     }
     bias += H.ldlt().solve(b);
   }
-  return parallax;
+  return {bias, parallax};
 }
 
 Eigen::Vector3d epipolar_gyroscope_bias(const Problem& problem) {

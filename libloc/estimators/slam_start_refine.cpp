@@ -279,6 +279,7 @@ struct Census {
   int features = 0;
   std::vector<double> radii;  // squared, in deviations as stated
   double squares_px = 0;
+  double bounded_cost = 0;  // of all observations
 };
 
 // Marks observations beyond the bound as outliers (and others as good again), points with too few as unused.
@@ -291,12 +292,15 @@ Census examine(Problem& problem, Unknowns& x, double ratio, bool mark) {
     int good = 0;
     std::vector<double> radii;
     double squares = 0;
-    if (x.points[t].used) {
+    if (!x.points[t].used) {
+      census.bounded_cost += kReject * total;
+    } else {
       for (Observation& o : track.observations) {
         const auto frame = static_cast<std::size_t>(o.frame);
         const auto model = pixel_model(problem, poses[frame].rotation, poses[frame].position, x.points[t]);
         const double square = model ? (o.pixel_px - model->pixel_px).squaredNorm() : kOutside;
         const double radius = square / squared(problem.sigma_px[frame]);
+        census.bounded_cost += std::min(radius, kReject);
         if (mark) o.used = model && radius <= kReject * squared(ratio);
         if (!o.used) continue;
         ++good;
@@ -455,7 +459,7 @@ std::optional<PixelModel> pixel_model(const Problem& problem, const Eigen::Matri
   return out;
 }
 
-std::optional<Refined> refine(Problem& problem, const Eigen::Vector3d& gyroscope_bias, const ClosedForm& start) {
+std::optional<Refined> refine(Problem problem, const Eigen::Vector3d& gyroscope_bias, const ClosedForm& start) {
   Refined out;
   Unknowns& x = out.x;
   x.velocity = start.velocity;
@@ -493,12 +497,14 @@ std::optional<Refined> refine(Problem& problem, const Eigen::Vector3d& gyroscope
   }
   census = examine(problem, x, refinement.ratio(), false);
   if (census.features == 0) return std::nullopt;
+  out.cost = census.bounded_cost;
   out.sigma_ratio = refinement.ratio();
   out.observations = census.observations;
   out.outliers = census.outliers;
   out.features = census.features;
   out.residual_px_rms = std::sqrt(census.squares_px / (2.0 * census.observations));
   if (!judge(problem, refinement, out)) return std::nullopt;
+  out.tracks = std::move(problem.tracks);
   return out;
 }
 
