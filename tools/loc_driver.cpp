@@ -1,11 +1,12 @@
 // loc-driver: a recording onto LCM, as if it happened now, or a GPS receiver as it happens.
-#include <spdlog/spdlog.h>
 
+#include <CLI/CLI.hpp>
 #include <cmath>
 
 #include "tools/support/channels.hpp"
 #include "tools/support/driver.hpp"
 #include "tools/support/gps_options.hpp"
+#include "tools/support/log.hpp"
 #include "tools/support/open_source.hpp"
 #include "tools/support/program.hpp"
 #include "tools/support/rig_option.hpp"
@@ -102,14 +103,14 @@ int main(int argc, char** argv) {
     source.gps.on_time_event = [&time_base](const loc::GpsTimeEvent& event) { time_base.take(event); };
     loc::Driver driver(options, time_base.wrap(loc::open_source(source), options.lcm_url, source.kind));
     running = &driver;
-    spdlog::info("event=started source=\"{}\" speed={} url={}", options.source_name, speed, options.lcm_url);
+    loc::log_info("event=started source=\"{}\" speed={} url={}", options.source_name, speed, options.lcm_url);
     try {
       driver.run();
     } catch (...) {
-      spdlog::error("event=not_completed {}", loc::format_counts(driver.counts()));
+      loc::log_error("event=not_completed {}", loc::format_counts(driver.counts()));
       throw;
     }
-    spdlog::info("event=ended interrupted={} {}", loc::stop_requested(), loc::format_counts(driver.counts()));
+    loc::log_info("event=ended interrupted={} {}", loc::stop_requested(), loc::format_counts(driver.counts()));
     return loc::kExitOk;
   });
 }

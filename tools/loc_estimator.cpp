@@ -1,11 +1,13 @@
 // loc-estimator: measurements in, estimates out; on LCM, or off line from a recording to a file, through the same code.
-#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
 
 #include "tools/support/any_estimator.hpp"
 #include "tools/support/channels.hpp"
 #include "tools/support/estimate_output.hpp"
 #include "tools/support/fusion_options.hpp"
 #include "tools/support/live_estimator.hpp"
+#include "tools/support/log.hpp"
 #include "tools/support/open_source.hpp"
 #include "tools/support/pipeline.hpp"
 #include "tools/support/program.hpp"
@@ -73,19 +75,19 @@ int run_offline(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimat
   }
   pipeline.end();
   output->finish();
-  spdlog::info("event=ended interrupted={} estimates={} output=\"{}\" source=\"{}\" {} {}", loc::stop_requested(),
-               estimates, arguments.output, input.path, loc::format_counts(source->counts()),
-               loc::format_counts(pipeline.counts()));
+  loc::log_info("event=ended interrupted={} estimates={} output=\"{}\" source=\"{}\" {} {}", loc::stop_requested(),
+                estimates, arguments.output, input.path, loc::format_counts(source->counts()),
+                loc::format_counts(pipeline.counts()));
   for (const loc::NamedCount& count : source->counts()) {
     if (count.value > 0 && count.name.find("skipped") != std::string::npos) {
-      spdlog::warn("event=skipped source=\"{}\" {}={}", input.path, count.name, count.value);
+      loc::log_warning("event=skipped source=\"{}\" {}={}", input.path, count.name, count.value);
     }
   }
   for (const std::string& doubt : pipeline.unit_doubts()) {
-    spdlog::warn("event=implausible_unit source=\"{}\" reason=\"{}\"", input.path, doubt);
+    loc::log_warning("event=implausible_unit source=\"{}\" reason=\"{}\"", input.path, doubt);
   }
   if (estimates == 0) {
-    spdlog::error("event=no_estimate source=\"{}\" reason=\"no IMU sample could be used\"", input.path);
+    loc::log_error("event=no_estimate source=\"{}\" reason=\"no IMU sample could be used\"", input.path);
     return loc::kExitFailed;
   }
   return loc::stop_requested() ? loc::kExitFailed : loc::kExitOk;
@@ -93,13 +95,13 @@ int run_offline(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimat
 
 int run_live(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimator estimator) {
   loc::LiveEstimator live(arguments.live, std::move(estimator), rig);
-  spdlog::info("event=started method={} preset={} world={} url={}", arguments.method, arguments.preset, arguments.world,
-               arguments.live.lcm_url);
+  loc::log_info("event=started method={} preset={} world={} url={}", arguments.method, arguments.preset,
+                arguments.world, arguments.live.lcm_url);
   live.run();
   for (const std::string& doubt : live.unit_doubts()) {
-    spdlog::warn("event=implausible_unit reason=\"{}\"", doubt);
+    loc::log_warning("event=implausible_unit reason=\"{}\"", doubt);
   }
-  spdlog::info("event=ended {} {}", loc::format_counts(live.counts()), loc::format_latency("latency", live.latency()));
+  loc::log_info("event=ended {} {}", loc::format_counts(live.counts()), loc::format_latency("latency", live.latency()));
   return loc::kExitOk;
 }
 

@@ -1,12 +1,13 @@
 // loc-hub: the server behind LCM URLs that begin with tcpq://, for places without multicast.
 // Prints that URL to stdout once it listens.
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <iostream>
 
 #include "msgs/convert.hpp"
 #include "tools/support/hub.hpp"
+#include "tools/support/log.hpp"
 #include "tools/support/program.hpp"
 #include "tools/support/statistics.hpp"
 
@@ -17,9 +18,9 @@ constexpr loc::TimeNs kSecond = 1'000'000'000;
 int serve(const loc::HubOptions& options, bool statistics) {
   loc::Hub hub(options);
   std::cout << "tcpq://" << options.bind_address << ":" << hub.port() << std::endl;
-  spdlog::info("event=listening address={} port={}", options.bind_address, hub.port());
+  loc::log_info("event=listening address={} port={}", options.bind_address, hub.port());
   if (options.bind_address != "127.0.0.1") {
-    spdlog::warn("event=open_to_others address={} reason=\"LCM has no access control\"", options.bind_address);
+    loc::log_warning("event=open_to_others address={} reason=\"LCM has no access control\"", options.bind_address);
   }
   loc::TimeNs next_report = loc::steady_now() + kSecond;
   while (!loc::stop_requested()) {
@@ -27,13 +28,13 @@ int serve(const loc::HubOptions& options, bool statistics) {
     if (!statistics || loc::steady_now() < next_report) continue;
     next_report += kSecond;
     const loc::NamedCounts counts = hub.statistics();
-    spdlog::info("event=statistics {}", loc::format_counts(counts));
+    loc::log_info("event=statistics {}", loc::format_counts(counts));
     const auto message = loc::statistics_message("loc-hub", counts);
     std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
     message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
     hub.publish(loc::kStatisticsChannel, bytes);
   }
-  spdlog::info("event=ended {}", loc::format_counts(hub.statistics()));
+  loc::log_info("event=ended {}", loc::format_counts(hub.statistics()));
   return loc::kExitOk;
 }
 

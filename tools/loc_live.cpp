@@ -1,9 +1,10 @@
 // loc-live: driver, estimator, logger and, where there is no multicast, a hub, from one command.
-#include <spdlog/spdlog.h>
 
+#include <CLI/CLI.hpp>
 #include <filesystem>
 
 #include "tools/support/live_session.hpp"
+#include "tools/support/log.hpp"
 #include "tools/support/open_source.hpp"
 #include "tools/support/program.hpp"
 
@@ -58,7 +59,7 @@ int main(int argc, char** argv) {
     if (statistics) options.common.emplace_back("--statistics");
     loc::LiveSession session(options);
     const bool all_well = session.run();
-    spdlog::info("event=ended interrupted={} all_well={}", loc::stop_requested(), all_well);
+    loc::log_info("event=ended interrupted={} all_well={}", loc::stop_requested(), all_well);
     return all_well ? loc::kExitOk : loc::kExitFailed;
   });
 }

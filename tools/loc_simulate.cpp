@@ -1,6 +1,6 @@
 // loc-simulate: sensors on a known motion, written as a recording with its truth or published as if they were real.
-#include <spdlog/spdlog.h>
 
+#include <CLI/CLI.hpp>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -8,6 +8,7 @@
 
 #include "libloc/core/check.hpp"
 #include "libloc/sim/scenario_parameters.hpp"
+#include "tools/support/log.hpp"
 #include "tools/support/program.hpp"
 #include "tools/support/simulate.hpp"
 
@@ -133,20 +134,20 @@ int main(int argc, char** argv) {
         throw loc::UsageError("--speed '" + speed + "': must be a positive number");
       }
       plan.scenario.start_time_ns = loc::host_now();
-      spdlog::info("event=started scenario={} seed={} url={}", plan.scenario.name, plan.seed, driver.lcm_url);
+      loc::log_info("event=started scenario={} seed={} url={}", plan.scenario.name, plan.seed, driver.lcm_url);
       loc::publish_simulation(plan, request, driver);
       return loc::kExitOk;
     }
     if (request.out.empty() && request.tracks.empty() && request.rig.empty() && request.pictures.video.empty()) {
       throw loc::UsageError("nothing to do: --out, --tracks, --video, --write-rig, or --live");
     }
-    spdlog::info("event=started scenario={} seed={} duration_s={}", plan.scenario.name, plan.seed,
-                 plan.scenario.duration_s);
+    loc::log_info("event=started scenario={} seed={} duration_s={}", plan.scenario.name, plan.seed,
+                  plan.scenario.duration_s);
     if (!loc::write_simulation(plan, request)) {
-      spdlog::error("event=interrupted result=\"nothing was written\"");
+      loc::log_error("event=interrupted result=\"nothing was written\"");
       return loc::kExitFailed;
     }
-    spdlog::info("event=ended out={}", request.out);
+    loc::log_info("event=ended out={}", request.out);
     return loc::kExitOk;
   });
 }

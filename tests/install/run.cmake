@@ -10,12 +10,12 @@ endfunction()
 
 file(REMOVE_RECURSE "${WORK_DIR}")
 set(configure "${CMAKE_COMMAND}" -S "${SOURCE_DIR}/tests/install" -B "${WORK_DIR}/build" -G "${GENERATOR}"
-  "-DCMAKE_CXX_COMPILER=${CXX}" "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}" -DCMAKE_BUILD_TYPE=)
+  "-DCMAKE_CXX_COMPILER=${CXX}" "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}")
 if(MODE STREQUAL "installed")
   run("${CMAKE_COMMAND}" --install "${BUILD_DIR}" --prefix "${WORK_DIR}/prefix")
   # Moved: nothing may point to where it was installed first.
   file(RENAME "${WORK_DIR}/prefix" "${WORK_DIR}/moved")
-  run(${configure} "-DCMAKE_PREFIX_PATH=${WORK_DIR}/moved")
+  run(${configure} "-DCMAKE_PREFIX_PATH=${WORK_DIR}/moved" -DCMAKE_BUILD_TYPE=)
   set(programs uses_core uses_all)
   set(not_built "^$")
   file(GLOB_RECURSE exported "${WORK_DIR}/moved/*.cmake")
@@ -29,8 +29,8 @@ if(MODE STREQUAL "installed")
     endforeach()
   endforeach()
 else()
-  run(${configure} "-DLIBLOC_SOURCE_DIR=${SOURCE_DIR}")
-  # The core only, without optimisation: every file of it is compiled once more here.
+  # The core only, and with the main build's flags: every file of it is compiled once more here, by ccache if there is one.
+  run(${configure} "-DLIBLOC_SOURCE_DIR=${SOURCE_DIR}" -DCMAKE_BUILD_TYPE=Release -DLOC_WARNINGS_AS_ERRORS=ON)
   set(programs uses_core)
   set(not_built uses_all)
 endif()

@@ -1,5 +1,7 @@
 #include "tools/support/channels.hpp"
 
+#include <CLI/CLI.hpp>
+
 #include "tools/support/program.hpp"
 
 namespace loc {

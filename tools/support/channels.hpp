@@ -1,12 +1,12 @@
 // --channel STREAM=NAME: which LCM channel carries which stream.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <string>
 #include <vector>
 
 #include "libloc/sensors/measurements.hpp"
+#include "tools/support/cli_forward.hpp"
 
 namespace loc {
 

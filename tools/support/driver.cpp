@@ -1,11 +1,10 @@
 #include "tools/support/driver.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <cmath>
 
 #include "libloc/core/check.hpp"
 #include "msgs/convert.hpp"
+#include "tools/support/log.hpp"
 #include "tools/support/program.hpp"
 #include "tools/support/statistics.hpp"
 
@@ -166,11 +165,11 @@ bool Driver::send(const std::string& channel, const Message& message) {
   if (publisher_.publish(channel, message)) return true;
   if (options_.live) {
     // A sensor does not wait; the estimator sees the jump of the sequence.
-    if (not_sent_++ == 0) spdlog::warn("event=connection_lost url={}", options_.lcm_url);
+    if (not_sent_++ == 0) log_warning("event=connection_lost url={}", options_.lcm_url);
     return false;
   }
   // A recording can wait: nothing is lost while the hub is away.
-  spdlog::warn("event=connection_lost url={}", options_.lcm_url);
+  log_warning("event=connection_lost url={}", options_.lcm_url);
   const TimeNs give_up = steady_now() + from_seconds(options_.reconnect_timeout_s);
   while (!publisher_.publish(channel, message)) {
     if (!sleep_for(kSecond / 20)) return false;
@@ -207,7 +206,7 @@ void Driver::publish_status(std::int8_t state, const std::string& text) {
   }
   message.streams = static_cast<std::int32_t>(message.published.size());
   // A status may be lost together with the connection; measurements may not, see send().
-  if (!publisher_.publish(kSourceStatusChannel, message)) spdlog::warn("event=status_not_sent state={}", state);
+  if (!publisher_.publish(kSourceStatusChannel, message)) log_warning("event=status_not_sent state={}", state);
 }
 
 bool Driver::duration_is_over() const {
@@ -232,7 +231,7 @@ void Driver::report_each_second() {
   publish_status(source_status_t::STATE_RUNNING, trouble_);
   if (!options_.statistics) return;
   const NamedCounts figures = counts();
-  spdlog::info("event=statistics {}", format_counts(figures));
+  log_info("event=statistics {}", format_counts(figures));
   publisher_.publish(kStatisticsChannel, statistics_message("loc-driver", figures));
 }
 

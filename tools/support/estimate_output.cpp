@@ -1,7 +1,5 @@
 #include "tools/support/estimate_output.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <filesystem>
 #include <utility>
 #include <vector>
@@ -10,6 +8,7 @@
 #include "libloc/io/lcm_log.hpp"
 #include "libloc/io/tum.hpp"
 #include "msgs/convert.hpp"
+#include "tools/support/log.hpp"
 #include "tools/support/program.hpp"
 
 namespace loc {
@@ -44,15 +43,15 @@ class TumOutput : public EstimateOutput {
   }
   void finish() override {
     if (without_position_ > 0) {
-      spdlog::warn("event=no_position file=\"{}\" poses={} effect=\"the position column holds 0\"", path_,
-                   without_position_);
+      log_warning("event=no_position file=\"{}\" poses={} effect=\"the position column holds 0\"", path_,
+                  without_position_);
     }
     if (without_orientation_ > 0) {
-      spdlog::warn("event=left_out file=\"{}\" estimates_without_orientation={}", path_, without_orientation_);
+      log_warning("event=left_out file=\"{}\" estimates_without_orientation={}", path_, without_orientation_);
     }
     if (time_set_back_ > 0) {
       // A trajectory has one time line; CSV and LCM logs hold these estimates.
-      spdlog::warn("event=left_out file=\"{}\" estimates_after_clock_was_set_back={}", path_, time_set_back_);
+      log_warning("event=left_out file=\"{}\" estimates_after_clock_was_set_back={}", path_, time_set_back_);
     }
     write_tum(path_, trajectory_);
   }

@@ -1,5 +1,6 @@
 #include "tools/support/fusion_options.hpp"
 
+#include <CLI/CLI.hpp>
 #include <array>
 #include <cmath>
 #include <cstdlib>

@@ -1,12 +1,12 @@
 // The options of --method error-state.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 
 #include "libloc/estimators/inertial_fusion.hpp"
 #include "libloc/io/source.hpp"
 #include "libloc/sensors/rig.hpp"
+#include "tools/support/cli_forward.hpp"
 
 namespace loc {
 

@@ -1,12 +1,12 @@
 #include "tools/support/gps_options.hpp"
 
-#include <spdlog/spdlog.h>
-
+#include <CLI/CLI.hpp>
 #include <fstream>
 #include <sstream>
 #include <tuple>
 
 #include "libloc/core/check.hpp"
+#include "tools/support/log.hpp"
 
 namespace loc {
 namespace {
@@ -59,7 +59,7 @@ LeapSeconds newest_table() {
 
 void add_fix_options(CLI::App& source, NmeaFixOptions& fix) {
   fix.leap_seconds = newest_table();
-  fix.on_remark = [](const std::string& text) { spdlog::warn("event=gps_date reason=\"{}\"", text); };
+  fix.on_remark = [](const std::string& text) { log_warning("event=gps_date reason=\"{}\"", text); };
   CLI::Option* constant = source.add_option_function<int>(
       "--leap-seconds", [&fix](int seconds) { fix.leap_seconds = LeapSeconds::constant(seconds); },
       "GPS time minus UTC [s], instead of the table (the program's or the system's, whichever is newer)");

@@ -1,8 +1,7 @@
 // The GPS sources on a command line: nmea FILE, gps-serial DEVICE, gps-tcp HOST:PORT, gpsd [HOST[:PORT]].
 #pragma once
 
-#include <CLI/CLI.hpp>
-
+#include "tools/support/cli_forward.hpp"
 #include "tools/support/open_source.hpp"
 
 namespace loc {

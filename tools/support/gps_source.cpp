@@ -1,6 +1,5 @@
 #include "tools/support/gps_source.hpp"
 
-#include <spdlog/spdlog.h>
 #include <sys/poll.h>
 
 #include <array>
@@ -11,6 +10,7 @@
 
 #include "libloc/core/check.hpp"
 #include "libloc/io/nmea.hpp"
+#include "tools/support/log.hpp"
 #include "tools/support/program.hpp"
 
 namespace loc {
@@ -172,7 +172,7 @@ void LiveGpsOptions::check() const {
 
 void Reconnection::connected(const std::string& name) {
   ++connections_;
-  spdlog::info("event=gps_connected name=\"{}\" connections={}", name, connections_);
+  log_info("event=gps_connected name=\"{}\" connections={}", name, connections_);
 }
 
 void Reconnection::lost(const std::string& name, const std::string& why) {
@@ -188,9 +188,9 @@ void Reconnection::failed(const std::string& why) {
 void Reconnection::trouble(const std::string& why) {
   if (why == trouble_) return;
   if (why.empty()) {
-    spdlog::info("event=gps_well");
+    log_info("event=gps_well");
   } else {
-    spdlog::warn("event=gps_trouble reason=\"{}\"", why);
+    log_warning("event=gps_trouble reason=\"{}\"", why);
   }
   trouble_ = why;
   if (options_.on_trouble) options_.on_trouble(why);
@@ -204,7 +204,7 @@ void Reconnection::heard(const GpsMeasurement& fix) {
   const std::string time =
       fix.gps_time_ns == kNoTime ? "unknown" : to_text(utc_from_gps(fix.gps_time_ns, options_.fix.leap_seconds));
   const std::string satellites = fix.satellites < 0 ? "unknown" : std::to_string(fix.satellites);
-  spdlog::info("event=gps_fix time={} satellites={} fix={}", time, satellites, name_of(fix.fix));
+  log_info("event=gps_fix time={} satellites={} fix={}", time, satellites, name_of(fix.fix));
 }
 
 void Reconnection::look_for_fix() {
@@ -213,7 +213,7 @@ void Reconnection::look_for_fix() {
   if (fix_state_ == FixState::kNoFix || now - last_fix_ns_ < from_seconds(options_.silence_s)) return;
   const char* what = fix_state_ == FixState::kFix ? "lost" : "none so far";
   fix_state_ = FixState::kNoFix;
-  spdlog::warn("event=gps_no_fix state=\"{}\" for_s={:.1f}", what, to_seconds(now - last_fix_ns_));
+  log_warning("event=gps_no_fix state=\"{}\" for_s={:.1f}", what, to_seconds(now - last_fix_ns_));
 }
 
 bool Reconnection::wait() const {

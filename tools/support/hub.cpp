@@ -4,7 +4,6 @@
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <re2/re2.h>
-#include <spdlog/spdlog.h>
 #include <sys/epoll.h>
 #include <sys/socket.h>
 #include <sys/uio.h>
@@ -17,6 +16,7 @@
 #include <utility>
 
 #include "libloc/core/check.hpp"
+#include "tools/support/log.hpp"
 
 namespace loc {
 namespace {
@@ -164,7 +164,7 @@ void Hub::accept_clients() {
       if (errno == EAGAIN || errno == EWOULDBLOCK) return;
       if (errno == EINTR || errno == ECONNABORTED) continue;
       // Out of descriptors or memory: the connection stays in the backlog and would wake us at once again.
-      spdlog::error("event=accept_failed reason=\"{}\"", std::generic_category().message(errno));
+      log_error("event=accept_failed reason=\"{}\"", std::generic_category().message(errno));
       watch(epoll_.get(), EPOLL_CTL_DEL, listener_.get(), 0, 0);
       accepting_ = false;
       accept_again_ = Clock::now() + kAcceptPause;
@@ -176,7 +176,7 @@ void Hub::accept_clients() {
     if (clients_.size() - dead_.size() >= options_.max_clients) {
       ++counts_.refused;
       if (may_log()) {
-        spdlog::warn("event=client_refused peer={} reason=\"{} clients are the limit\"", peer, options_.max_clients);
+        log_warning("event=client_refused peer={} reason=\"{} clients are the limit\"", peer, options_.max_clients);
       }
       continue;
     }
@@ -185,7 +185,7 @@ void Hub::accept_clients() {
     const std::uint64_t id = next_id_++;
     auto client = std::make_unique<Client>(id, std::move(socket), std::move(peer), options_.limits);
     watch(epoll_.get(), EPOLL_CTL_ADD, client->socket.get(), EPOLLIN, id);
-    if (may_log()) spdlog::debug("event=client_connected client={} peer={}", id, client->peer);
+    if (may_log()) log_debug("event=client_connected client={} peer={}", id, client->peer);
     clients_.emplace(id, std::move(client));
     ++counts_.accepted;
   }
@@ -253,8 +253,8 @@ void Hub::subscribe(Client& client, std::string_view pattern) {
         regex->error_code() == RE2::ErrorBadPerlOp || regex->error_code() == RE2::ErrorBadEscape;
     if (!only_unknown_to_re2) throw DataError("subscription '" + std::string(pattern) + "': " + regex->error());
     if (may_log()) {
-      spdlog::warn(R"(event=pattern_taken_as_all client={} pattern="{}" reason="{}")", client.id, pattern,
-                   regex->error());
+      log_warning(R"(event=pattern_taken_as_all client={} pattern="{}" reason="{}")", client.id, pattern,
+                  regex->error());
     }
     regex.reset();
   }
@@ -287,8 +287,8 @@ void Hub::enqueue(Client& client, const Frame& frame) {
   if (full()) {
     ++counts_.dropped;
     if (client.dropped++ == 0) {
-      spdlog::warn("event=slow_client client={} peer={} queued_bytes={} action=\"new messages for it are dropped\"",
-                   client.id, client.peer, client.queued_bytes);
+      log_warning("event=slow_client client={} peer={} queued_bytes={} action=\"new messages for it are dropped\"",
+                  client.id, client.peer, client.queued_bytes);
     }
     return;
   }
@@ -388,9 +388,9 @@ void Hub::condemn(Client& client, const std::string& reason, std::int64_t* count
   dead_.push_back(client.id);
   if (counter != nullptr) ++*counter;
   if (!may_log()) return;
-  const auto level = counter != nullptr || client.dropped > 0 ? spdlog::level::warn : spdlog::level::debug;
-  spdlog::log(level, "event=client_closed client={} peer={} dropped={} reason=\"{}\"", client.id, client.peer,
-              client.dropped, reason);
+  const auto level = counter != nullptr || client.dropped > 0 ? LogLevel::kWarning : LogLevel::kDebug;
+  log_at(level, "event=client_closed client={} peer={} dropped={} reason=\"{}\"", client.id, client.peer,
+         client.dropped, reason);
 }
 
 void Hub::bury() {
@@ -403,7 +403,7 @@ bool Hub::may_log() {
   const auto now = Clock::now();
   if (now - log_second_ > std::chrono::seconds(1)) {
     if (logged_in_second_ > kMaxLogLinesPerSecond) {
-      spdlog::warn("event=log_lines_left_out count={}", logged_in_second_ - kMaxLogLinesPerSecond);
+      log_warning("event=log_lines_left_out count={}", logged_in_second_ - kMaxLogLinesPerSecond);
     }
     log_second_ = now;
     logged_in_second_ = 0;

@@ -3,7 +3,6 @@
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
-#include <spdlog/spdlog.h>
 #include <sys/poll.h>
 #include <sys/socket.h>
 #include <sys/time.h>
@@ -17,6 +16,7 @@
 #include <utility>
 
 #include "tools/support/file_descriptor.hpp"
+#include "tools/support/log.hpp"
 #include "tools/support/program.hpp"
 #include "tools/support/tcpq_protocol.hpp"
 
@@ -129,7 +129,7 @@ void warn_of_small_buffer(const std::string& options) {
   if (std::ifstream("/proc/sys/net/core/rmem_max") >> limit && limit < wanted) {
     static bool warned = false;
     if (!std::exchange(warned, true)) {
-      spdlog::warn(
+      log_warning(
           "event=small_receive_buffer wanted={} limit={} effect=\"large images may be lost\" mend=\"sysctl -w "
           "net.core.rmem_max={}\"",
           wanted, limit, wanted);
@@ -191,10 +191,10 @@ bool LcmPublisher::connected() {
   try {
     lcm_.reset();
     lcm_ = open_lcm(url_);
-    spdlog::info("event=publisher_reconnected failed={}", failed_);
+    log_info("event=publisher_reconnected failed={}", failed_);
     return true;
   } catch (const std::runtime_error& error) {
-    spdlog::warn("event=publisher_not_connected reason=\"{}\"", error.what());
+    log_warning("event=publisher_not_connected reason=\"{}\"", error.what());
     return false;
   }
 }
@@ -234,13 +234,13 @@ bool LcmReceiver::handle(int timeout_ms) {
     if (lcm_ != nullptr) {
       lcm_.reset();
       ++disconnects_;
-      spdlog::warn("event=receiver_disconnected url={}", url_);
+      log_warning("event=receiver_disconnected url={}", url_);
     }
     try {
       auto fresh = open_lcm(url_);
       lcm_ = std::move(fresh);
       for (auto& subscription : subscriptions_) attach(*subscription);
-      spdlog::info("event=receiver_reconnected url={}", url_);
+      log_info("event=receiver_reconnected url={}", url_);
     } catch (const std::runtime_error&) {
       sleep_for(std::min<TimeNs>(kRetryNs, static_cast<TimeNs>(timeout_ms) * 1'000'000));
     }

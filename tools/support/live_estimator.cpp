@@ -1,7 +1,5 @@
 #include "tools/support/live_estimator.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <exception>
 #include <thread>
@@ -11,6 +9,7 @@
 #include "loc/source_status_t.hpp"
 #include "msgs/convert.hpp"
 #include "tools/support/flow_control.hpp"
+#include "tools/support/log.hpp"
 #include "tools/support/program.hpp"
 
 namespace loc {
@@ -89,8 +88,8 @@ LiveEstimator::LiveEstimator(LiveEstimatorOptions options, AnyEstimator estimato
       const bool kept = queues_.push(input, data, host_now());
       const bool lossless = input < inputs_.size() && inputs_[input] != StreamKind::kImage;
       if (!kept && lossless && queues_.dropped(input) == 1) {
-        spdlog::error("event=queue_full stream={} effect=\"samples are lost; all of them are counted\"",
-                      stream_name(inputs_[input]));
+        log_error("event=queue_full stream={} effect=\"samples are lost; all of them are counted\"",
+                  stream_name(inputs_[input]));
       }
     });
   }
@@ -109,7 +108,7 @@ void LiveEstimator::run() {
     stop_receiving_ = true;
     const TimeNs give_up = steady_now() + kDrainLimit;
     while (queues_.waiting() > 0 && steady_now() < give_up && queues_.pop(message, 0)) handle(message);
-    if (queues_.waiting() > 0) spdlog::error("event=left_unprocessed messages={}", queues_.waiting());
+    if (queues_.waiting() > 0) log_error("event=left_unprocessed messages={}", queues_.waiting());
     pipeline_.end();
     publish_statistics();
   } catch (...) {
@@ -125,7 +124,7 @@ void LiveEstimator::receive() {
     try {
       receiver_.handle(kReceivePollMs);
     } catch (const std::exception& error) {
-      spdlog::error("event=receive_failed reason=\"{}\"", error.what());
+      log_error("event=receive_failed reason=\"{}\"", error.what());
     }
   }
 }
@@ -140,7 +139,7 @@ void LiveEstimator::handle(const RawMessage& message) {
 
 void LiveEstimator::refuse(std::size_t input, const std::string& reason) {
   if (++refused_[input] <= kRefusalsLogged) {
-    spdlog::warn("event=message_refused channel={} reason=\"{}\"", channels_[input], reason);
+    log_warning("event=message_refused channel={} reason=\"{}\"", channels_[input], reason);
   }
 }
 
@@ -169,8 +168,8 @@ void LiveEstimator::handle_source_status(const RawMessage& message) {
   }
   if (status.state != source_status_t::STATE_RUNNING) {
     if (!source_ended_) {
-      spdlog::info(R"(event=source_ended source="{}" failed={} message="{}")", status.source,
-                   status.state == source_status_t::STATE_FAILED, status.message);
+      log_info(R"(event=source_ended source="{}" failed={} message="{}")", status.source,
+               status.state == source_status_t::STATE_FAILED, status.message);
     }
     pipeline_.end();
     source_ended_ = true;
@@ -200,7 +199,7 @@ void LiveEstimator::publish_statistics() {
 void LiveEstimator::report_each_second() {
   if (!options_.statistics || steady_now() < next_report_ns_) return;
   next_report_ns_ = steady_now() + kSecond;
-  spdlog::info("event=statistics {} {}", format_counts(counts()), format_latency("latency", latency_));
+  log_info("event=statistics {} {}", format_counts(counts()), format_latency("latency", latency_));
   publish_statistics();
 }
 

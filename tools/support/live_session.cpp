@@ -1,6 +1,5 @@
 #include "tools/support/live_session.hpp"
 
-#include <spdlog/spdlog.h>
 #include <sys/poll.h>
 
 #include <filesystem>
@@ -9,6 +8,7 @@
 
 #include "libloc/core/check.hpp"
 #include "msgs/convert.hpp"
+#include "tools/support/log.hpp"
 #include "tools/support/program.hpp"
 #include "tools/support/statistics.hpp"
 
@@ -52,14 +52,14 @@ std::vector<std::string> LiveSession::command(const std::string& program,
 void LiveSession::choose_transport() {
   if (!options_.lcm_url.empty()) {
     url_ = options_.lcm_url;
-    spdlog::info("event=transport kind=given url={}", url_);
+    log_info("event=transport kind=given url={}", url_);
     return;
   }
   std::string reason;
   bool multicast = options_.transport != Transport::kHub && multicast_works(kDefaultLcmUrl, &reason);
   if (options_.as_fast_as_taken && !options_.log_path.empty() && multicast) {
     if (options_.transport == Transport::kUdpm) {
-      spdlog::warn("event=log_may_lack_messages reason=\"the logger is slower than --speed max on udpm\"");
+      log_warning("event=log_may_lack_messages reason=\"the logger is slower than --speed max on udpm\"");
     } else {
       multicast = false;
       reason = "at full speed the logger would lose messages on udpm";
@@ -71,12 +71,12 @@ void LiveSession::choose_transport() {
   }
   if (multicast) {
     url_ = kDefaultLcmUrl;
-    spdlog::info("event=transport kind=udpm url={}", url_);
+    log_info("event=transport kind=udpm url={}", url_);
     return;
   }
   own_hub_ = true;
   start_hub();
-  spdlog::info("event=transport kind=hub url={} reason=\"{}\"", url_, reason.empty() ? "asked for" : reason);
+  log_info("event=transport kind=hub url={} reason=\"{}\"", url_, reason.empty() ? "asked for" : reason);
 }
 
 void LiveSession::start_hub() {
@@ -110,7 +110,7 @@ void LiveSession::start_logger() {
     publisher.publish(kStatisticsChannel, statistics_message("loc-live", {}));
     pause(kWatchEvery);
   }
-  spdlog::info("event=logging file=\"{}\"", log_path_);
+  log_info("event=logging file=\"{}\"", log_path_);
 }
 
 void LiveSession::start_estimator() {
@@ -146,7 +146,7 @@ bool LiveSession::watch() {
   while (sleep_for(kWatchEvery)) {
     if (!driver_.process->running()) {
       if (driver_.process->succeeded()) return true;
-      spdlog::error("event=process_died program={} how=\"{}\"", driver_.name, driver_.process->describe());
+      log_error("event=process_died program={} how=\"{}\"", driver_.name, driver_.process->describe());
       all_well_ = false;
       return false;
     }
@@ -162,8 +162,8 @@ void LiveSession::look_after(Member& member, void (LiveSession::*start)()) {
   if (member.process == nullptr || member.given_up || member.process->running()) return;
   // The estimator ends by itself a moment before the driver does.
   if (&member == &estimator_ && member.process->succeeded()) return;
-  spdlog::error("event=process_died program={} how=\"{}\" restart={}", member.name, member.process->describe(),
-                options_.restart);
+  log_error("event=process_died program={} how=\"{}\" restart={}", member.name, member.process->describe(),
+            options_.restart);
   if (!options_.restart || member.restarts >= options_.max_restarts) {
     member.given_up = true;
     all_well_ = false;
@@ -171,7 +171,7 @@ void LiveSession::look_after(Member& member, void (LiveSession::*start)()) {
   }
   ++member.restarts;
   (this->*start)();
-  spdlog::warn("event=process_restarted program={} restarts={}", member.name, member.restarts);
+  log_warning("event=process_restarted program={} restarts={}", member.name, member.restarts);
 }
 
 void LiveSession::finish() {
@@ -182,7 +182,7 @@ void LiveSession::finish() {
     }
   }
   if (!estimator_.given_up && !stop_requested() && !estimator_.process->succeeded()) {
-    spdlog::error("event=estimator_not_finished how=\"{}\"", estimator_.process->describe());
+    log_error("event=estimator_not_finished how=\"{}\"", estimator_.process->describe());
     all_well_ = false;
   }
   wait_until_logged();
@@ -213,14 +213,14 @@ void LiveSession::stop(Member& member) {
   if (member.process == nullptr) return;
   const bool ran = member.process->running();
   if (ran && !member.process->stop(kStopPatience)) {
-    spdlog::error("event=process_killed program={} reason=\"did not end when asked to\"", member.name);
+    log_error("event=process_killed program={} reason=\"did not end when asked to\"", member.name);
     all_well_ = false;
   } else if (ran && !member.process->succeeded() && !member.process->stopped_early()) {
-    spdlog::error("event=process_failed program={} how=\"{}\"", member.name, member.process->describe());
+    log_error("event=process_failed program={} how=\"{}\"", member.name, member.process->describe());
     all_well_ = false;
   } else {
-    spdlog::info("event=process_ended program={} how=\"{}\" restarts={}", member.name, member.process->describe(),
-                 member.restarts);
+    log_info("event=process_ended program={} how=\"{}\" restarts={}", member.name, member.process->describe(),
+             member.restarts);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <sys/poll.h>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
@@ -13,6 +14,7 @@
 #include <utility>
 
 #include "tools/support/lcm_link.hpp"
+#include "tools/support/log.hpp"
 
 namespace loc {
 namespace {
@@ -55,45 +57,48 @@ TimeNs clock_now(clockid_t clock) {
 
 }  // namespace
 
-Program::Program(std::string name, const std::string& description) : name_(std::move(name)), app_(description, name_) {
-  app_.set_version_flag("--version", name_ + " " LOC_VERSION);
-  app_.add_option("--log-level", log_level_, "Log lines on stderr from this level on")
+Program::Program(std::string name, const std::string& description)
+    : name_(std::move(name)), app_(std::make_unique<CLI::App>(description, name_)) {
+  app_->set_version_flag("--version", name_ + " " LOC_VERSION);
+  app_->add_option("--log-level", log_level_, "Log lines on stderr from this level on")
       ->check(CLI::IsMember({"debug", "info", "warning", "error", "off"}))
       ->capture_default_str();
-  app_.footer("Exit codes: 0 all went well, 1 failed while running, 2 wrong options or configuration.");
-  app_.get_formatter()->column_width(34);
+  app_->footer("Exit codes: 0 all went well, 1 failed while running, 2 wrong options or configuration.");
+  app_->get_formatter()->column_width(34);
 }
+
+Program::~Program() = default;
 
 void Program::add_lcm_url(std::string& url) {
   if (url.empty()) url = kDefaultLcmUrl;
-  app_.add_option("--lcm-url", url, "Transport: udpm://GROUP:PORT?ttl=0&recv_buf_size=BYTES or tcpq://ADDRESS:PORT")
+  app_->add_option("--lcm-url", url, "Transport: udpm://GROUP:PORT?ttl=0&recv_buf_size=BYTES or tcpq://ADDRESS:PORT")
       ->envname("LCM_DEFAULT_URL")
       ->capture_default_str();
 }
 
 CLI::Option* Program::add_config(std::string& path) {
-  return app_.add_option("--config,--rig", path, "Calibration of the sensors (rig.yaml)")->check(CLI::ExistingFile);
+  return app_->add_option("--config,--rig", path, "Calibration of the sensors (rig.yaml)")->check(CLI::ExistingFile);
 }
 
 int Program::run(int argc, char** argv, const std::function<int()>& body) {
   try {
-    app_.parse(argc, argv);
+    app_->parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     // Help and version are "errors" with code 0.
-    return app_.exit(error) == 0 ? kExitOk : kExitUsage;
+    return app_->exit(error) == 0 ? kExitOk : kExitUsage;
   }
   start_log(name_, log_level_);
   install_signals();
   try {
     return body();
   } catch (const UsageError& error) {
-    spdlog::error("event=usage reason=\"{}\"", error.what());
+    log_error("event=usage reason=\"{}\"", error.what());
     return kExitUsage;
   } catch (const std::invalid_argument& error) {
-    spdlog::error("event=usage reason=\"{}\"", error.what());
+    log_error("event=usage reason=\"{}\"", error.what());
     return kExitUsage;
   } catch (const std::exception& error) {
-    spdlog::error("event=failed reason=\"{}\"", error.what());
+    log_error("event=failed reason=\"{}\"", error.what());
     return kExitFailed;
   }
 }

@@ -4,13 +4,14 @@
 // SIGINT and SIGTERM ask the program to end; its loops look at stop_requested() at least ten times a second.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
+#include <memory>
 #include <stdexcept>
 #include <string>
 
 #include "libloc/core/named_count.hpp"
 #include "libloc/core/time.hpp"
+#include "tools/support/cli_forward.hpp"
 
 namespace loc {
 
@@ -29,7 +30,11 @@ class Program {
   /// Adds --version and --log-level. @param name as installed: "loc-hub"
   Program(std::string name, const std::string& description);
 
-  CLI::App& app() { return app_; }
+  ~Program();
+  Program(const Program&) = delete;
+  Program& operator=(const Program&) = delete;
+
+  CLI::App& app() { return *app_; }
   const std::string& name() const { return name_; }
   const std::string& log_level() const { return log_level_; }
   /// Adds --lcm-url, preset with the default transport.
@@ -43,7 +48,7 @@ class Program {
  private:
   std::string name_;
   std::string log_level_ = "info";
-  CLI::App app_;
+  std::unique_ptr<CLI::App> app_;
 };
 
 /// A signal asked to end, or request_stop() was called.

@@ -1,6 +1,5 @@
 #include "tools/support/restamp.hpp"
 
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 
 #include "libloc/core/check.hpp"
 #include "msgs/convert.hpp"
+#include "tools/support/log.hpp"
 #include "tools/support/program.hpp"
 
 namespace loc {
@@ -90,8 +90,8 @@ std::optional<Measurement> RestampedSource::next() {
       waiting_.clear();
       const std::int64_t refused = bad_messages_ + other_sources_ + other_hosts_;
       if (refused > 0 && !std::exchange(told_refusal_, true)) {
-        spdlog::warn("event=clock_messages_refused wrong={} of_other_hosts={} of_second_program={} last=\"{}\"",
-                     bad_messages_, other_hosts_, other_sources_, last_refusal_);
+        log_warning("event=clock_messages_refused wrong={} of_other_hosts={} of_second_program={} last=\"{}\"",
+                    bad_messages_, other_hosts_, other_sources_, last_refusal_);
       }
       if (stamped_ == 0 && dropped_ > 0 && !stopped_) {
         throw DataError(
@@ -175,8 +175,8 @@ void RestampedSource::move_start(OdometryMeasurement& odometry, TimeNs device_ns
 
 void RestampedSource::drop_oldest() {
   if (!told_waiting_) {
-    spdlog::warn("event=clock_unknown dropped=\"what has waited for it longer than {} s\" waiting={}", options_.wait_s,
-                 waiting_.size());
+    log_warning("event=clock_unknown dropped=\"what has waited for it longer than {} s\" waiting={}", options_.wait_s,
+                waiting_.size());
   }
   told_waiting_ = true;
   ++dropped_;
@@ -316,8 +316,8 @@ void RestampedSource::take(const clock_t& message) {
     return;
   }
   if (!other_ || other_source_ != message.source || other_epoch_ != message.epoch) {
-    spdlog::info("event=clock clock=host onto=gps from=\"{}\" epoch={} sigma_us={:.1f}", message.source, message.epoch,
-                 line.sigma_ns * 1e-3);
+    log_info("event=clock clock=host onto=gps from=\"{}\" epoch={} sigma_us={:.1f}", message.source, message.epoch,
+             line.sigma_ns * 1e-3);
   }
   if (!other_ || other_source_ != message.source) other_since_ns_ = newest_arrival_ns_;
   other_ = line;
@@ -330,7 +330,7 @@ void RestampedSource::take(const clock_t& message) {
 }
 
 void RestampedSource::refuse(std::int64_t& count, const std::string& why) {
-  if (count++ == 0) spdlog::warn("event=clock_message_refused reason=\"{}\"", why);
+  if (count++ == 0) log_warning("event=clock_message_refused reason=\"{}\"", why);
   last_refusal_ = why;
 }
 
@@ -369,8 +369,8 @@ void RestampedSource::report() {
   next_report_ns_ = saturating_sum(now, kReportEvery);
   if (first) return;  // there is nothing to tell yet
   for (const ClockStatus& s : status()) {
-    spdlog::info("event=clock clock={} onto={} basis={} offset={:.9f} skew_ppm={:.4f} sigma_us={:.1f} waiting={}",
-                 s.clock, s.onto, s.basis, s.offset_s, s.skew_ppm, s.sigma_us, waiting_.size());
+    log_info("event=clock clock={} onto={} basis={} offset={:.9f} skew_ppm={:.4f} sigma_us={:.1f} waiting={}", s.clock,
+             s.onto, s.basis, s.offset_s, s.skew_ppm, s.sigma_us, waiting_.size());
   }
 }
 

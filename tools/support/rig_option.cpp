@@ -1,9 +1,8 @@
 #include "tools/support/rig_option.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include "libloc/core/check.hpp"
 #include "libloc/io/rig_yaml.hpp"
+#include "tools/support/log.hpp"
 #include "tools/support/program.hpp"
 
 namespace loc {
@@ -13,8 +12,8 @@ Rig load_rig(const std::string& path) {
   try {
     Rig rig = read_any_rig(path);
     for (const RigDoubt& doubt : doubts(rig)) {
-      spdlog::warn(R"(event=rig_quality file="{}" block={} verdict={} reason="{}")", path, doubt.block,
-                   verdict_name(doubt.verdict), doubt.text);
+      log_warning(R"(event=rig_quality file="{}" block={} verdict={} reason="{}")", path, doubt.block,
+                  verdict_name(doubt.verdict), doubt.text);
     }
     return rig;
   } catch (const DataError& error) {

@@ -1,7 +1,5 @@
 #include "tools/support/simulate.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,6 +17,7 @@
 #include "libloc/sim/scenario_parameters.hpp"
 #include "libloc/sim/simulation.hpp"
 #include "msgs/lcm_log_writer.hpp"
+#include "tools/support/log.hpp"
 #include "tools/support/program.hpp"
 
 namespace loc {
@@ -101,7 +100,7 @@ class Progress {
     const TimeNs now = steady_now();
     if (now - last_ns_ < 1'000'000'000) return;
     last_ns_ = now;
-    spdlog::info("event=progress percent={}", static_cast<int>(100 * simulation.progress()));
+    log_info("event=progress percent={}", static_cast<int>(100 * simulation.progress()));
   }
 
  private:
@@ -173,7 +172,7 @@ bool write_simulation(const SimulationPlan& plan, const SimulateRequest& request
     }
     progress.tell(simulation);
   }
-  spdlog::info("event=simulated {}", format_counts(simulation.counts()));
+  log_info("event=simulated {}", format_counts(simulation.counts()));
   if (pictures) pictures->finish();
   if (!request.tracks.empty()) write_tracks(request.tracks, to_track_frames(features));
   if (!request.rig.empty()) write_rig(request.rig, rig);
@@ -184,8 +183,8 @@ bool write_simulation(const SimulationPlan& plan, const SimulateRequest& request
   write_scenario_file(named("scenario.yaml"), plan.scenario, plan.seed);
   for (const NamedCount& count : writer->counts()) {
     if (count.name.ends_with(".no_room")) {
-      spdlog::warn("event=not_in_recording {}={} reason=\"a folder has no room for them: an LCM log or --tracks has\"",
-                   count.name, count.value);
+      log_warning("event=not_in_recording {}={} reason=\"a folder has no room for them: an LCM log or --tracks has\"",
+                  count.name, count.value);
     }
   }
   writer->finish();
@@ -199,7 +198,7 @@ void publish_simulation(const SimulationPlan& plan, const SimulateRequest& reque
   Driver driver(options, std::make_unique<SimulationSource>(
                              Simulation(plan.scenario, plan.seed, {SimulationOptions::Order::kArrival})));
   driver.run();
-  spdlog::info("event=published interrupted={} {}", stop_requested(), format_counts(driver.counts()));
+  log_info("event=published interrupted={} {}", stop_requested(), format_counts(driver.counts()));
 }
 
 }  // namespace loc

@@ -1,5 +1,6 @@
 #include "tools/support/time_base.hpp"
 
+#include <CLI/CLI.hpp>
 #include <cmath>
 #include <utility>
 

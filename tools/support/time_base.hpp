@@ -2,13 +2,13 @@
 // restamp.hpp).
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "libloc/io/source.hpp"
 #include "libloc/sensors/gps_time_event.hpp"
+#include "tools/support/cli_forward.hpp"
 #include "tools/support/clock_link.hpp"
 #include "tools/support/restamp.hpp"
 
