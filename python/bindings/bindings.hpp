@@ -12,6 +12,8 @@ void bind_geometry(pybind11::module_& m);
 void bind_sensors(pybind11::module_& m);
 void bind_estimators(pybind11::module_& m);
 void bind_error_state(pybind11::module_& m);
+void bind_slam_options(pybind11::module_& m);
+void bind_slam(pybind11::module_& m);
 void bind_ellipsoid(pybind11::module_& m);
 void bind_clock(pybind11::module_& m);
 void bind_eval(pybind11::module_& m);

@@ -12,6 +12,7 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "columns.hpp"
 #include "fields.hpp"
 #include "libloc/io/points.hpp"
 #include "libloc/io/tracks.hpp"
@@ -46,24 +47,6 @@ Points points_of(const ArrayLike& object, const char* name) {
                           py::str(py::tuple(array.attr("shape"))).cast<std::string>());
   }
   return Eigen::Map<const Points>(array.data(), array.shape(0), 3);
-}
-
-template <class T, class Items, class Get>
-py::array_t<T> column(const Items& items, Get get) {
-  py::array_t<T> out(static_cast<py::ssize_t>(items.size()));
-  std::transform(items.begin(), items.end(), out.mutable_data(), get);
-  return out;
-}
-
-template <int columns, class Items, class Get>
-py::array_t<double> rows(const Items& items, Get get) {
-  py::array_t<double> out({static_cast<py::ssize_t>(items.size()), py::ssize_t{columns}});
-  double* data = out.mutable_data();
-  for (const auto& item : items) {
-    Eigen::Map<Eigen::Matrix<double, columns, 1>>{data} = get(item);
-    data += columns;
-  }
-  return out;
 }
 
 // ---- geometry

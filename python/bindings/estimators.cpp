@@ -326,6 +326,9 @@ void bind_estimate(py::module_& m) {
       .value("RECOVERED", loc::kRecovered)
       .value("TOO_LATE", loc::kTooLate)
       .value("BAD_COVARIANCE", loc::kBadCovariance)
+      .value("FEW_FEATURES", loc::kFewFeatures)
+      .value("FEATURES_REJECTED", loc::kFeaturesRejected)
+      .value("SCALE_UNKNOWN", loc::kScaleUnknown)
       .finalize();
   using loc::Estimate;
   py::class_<Estimate>(m, "Estimate", "What an estimator says after one measurement.")

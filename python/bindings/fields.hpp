@@ -8,17 +8,23 @@
 
 namespace locpy {
 
-/// @param type name for messages. @throws py::type_error naming a field that it does not have; what check() throws.
+/// @param type name for messages. @throws py::type_error naming a field that it does not have.
 template <class T>
-std::unique_ptr<T> with_fields(const char* type, const pybind11::kwargs& fields) {
-  auto value = std::make_unique<T>();
-  const pybind11::object self = pybind11::cast(value.get(), pybind11::return_value_policy::reference);
+void set_fields(const char* type, T& value, const pybind11::kwargs& fields) {
+  const pybind11::object self = pybind11::cast(&value, pybind11::return_value_policy::reference);
   for (const auto& [name, field] : fields) {
     if (!pybind11::hasattr(self, name)) {
       throw pybind11::type_error(std::string(type) + " has no field " + pybind11::cast<std::string>(name));
     }
     pybind11::setattr(self, name, field);
   }
+}
+
+/// @throws as set_fields; what check() throws.
+template <class T>
+std::unique_ptr<T> with_fields(const char* type, const pybind11::kwargs& fields) {
+  auto value = std::make_unique<T>();
+  set_fields(type, *value, fields);
   value->check();
   return value;
 }

@@ -21,5 +21,7 @@ PYBIND11_MODULE(_core, m) {
   locpy::bind_msgs(m);
   locpy::bind_motion(m);
   locpy::bind_camera(m);
+  locpy::bind_slam_options(m);
+  locpy::bind_slam(m);
   locpy::bind_simulated_sensors(m);
 }

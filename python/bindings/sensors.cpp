@@ -163,6 +163,23 @@ void bind_measurements(py::module_& m) {
 
   py::class_<FeaturesMeasurement> features(m, "FeaturesMeasurement",
                                            "The features of one frame with their identities.");
+  features.def(py::init([](loc::TimeNs time_ns, const TimeArray& id, const FloatArray& pixel, std::int32_t camera,
+                           double sigma, std::int64_t sequence) {
+                 auto out = stamped<FeaturesMeasurement>(time_ns);
+                 const auto ids = times_view(id, "id");
+                 const auto n = static_cast<py::ssize_t>(ids.size());
+                 const Rows<2> pixels = rows_view<2>(pixel, "pixel_px", n, "id");
+                 for (py::ssize_t i = 0; i < n; ++i) {
+                   out.features.push_back({ids[static_cast<std::size_t>(i)], pixels.row(i).transpose()});
+                 }
+                 out.camera = camera;
+                 out.sigma_px = sigma;
+                 out.sequence = sequence;
+                 return out;
+               }),
+               py::arg("time_ns"), py::arg("id"), py::arg("pixel_px"), py::kw_only(), py::arg("camera") = 0,
+               py::arg("sigma_px") = loc::kUnknown, py::arg("sequence") = -1,
+               "id int64 (M,), pixel_px (M, 2); sigma_px: deviation of one coordinate, NaN when unknown.");
   stamp_properties(features);
   features.def_readonly("camera", &FeaturesMeasurement::camera, "index of the camera in the rig")
       .def_readonly("sigma_px", &FeaturesMeasurement::sigma_px, "deviation of one coordinate; NaN when unknown")

@@ -1,0 +1,220 @@
+// estimators/slam_options, and points by inverse depth (geometry/inverse_depth).
+#include "libloc/estimators/slam_options.hpp"
+
+#include <pybind11/native_enum.h>
+#include <pybind11/stl.h>
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "fields.hpp"
+#include "libloc/geometry/inverse_depth.hpp"
+#include "properties.hpp"
+
+namespace locpy {
+namespace {
+
+using loc::InverseDepthPoint;
+using loc::KnownLandmark;
+using loc::SlamAssociationOptions;
+using loc::SlamMapOptions;
+using loc::SlamOptions;
+
+void bind_enumerations(py::module_& m) {
+  py::native_enum<loc::SlamMotion>(m, "SlamMotion", "enum.IntEnum", "What the filter knows of the motion.")
+      .value("CONSTANT_VELOCITY", loc::SlamMotion::kConstantVelocity, "camera alone: lengths in an unknown unit")
+      .value("INERTIAL", loc::SlamMotion::kInertial, "an IMU: metres, and a world with z up")
+      .finalize();
+  py::native_enum<loc::SlamConsistency>(
+      m, "SlamConsistency", "enum.IntEnum",
+      "What keeps the filter from learning what it cannot know (place, heading) out of its linearisation errors.")
+      .value("PLAIN", loc::SlamConsistency::kPlain, "nothing: Jacobians at the latest estimate")
+      .value("FIRST_ESTIMATE", loc::SlamConsistency::kFirstEstimate, "Jacobians by the first estimates")
+      .value("INVARIANT", loc::SlamConsistency::kInvariant, "right-invariant errors")
+      .finalize();
+  py::native_enum<loc::SlamPrecision>(m, "SlamPrecision", "enum.IntEnum", "Numbers of the covariance.")
+      .value("DOUBLE", loc::SlamPrecision::kDouble)
+      .value("FLOAT", loc::SlamPrecision::kFloat)
+      .finalize();
+}
+
+void bind_map_options(py::module_& m) {
+  using O = SlamMapOptions;
+  py::class_<O>(m, "SlamMapOptions", "Which features the map has; every field is a keyword of the constructor.")
+      .def(py::init([](const py::kwargs& fields) { return with_fields<O>("SlamMapOptions", fields); }),
+           "TypeError for an unknown field, ValueError for a value out of range.")
+      .def_readwrite("max_features", &O::max_features, "In the map; bounds memory and time.")
+      .def_readwrite("max_measured", &O::max_measured, "In one frame: the most informative ones of those in view.")
+      .def_readwrite("min_visible", &O::min_visible, "Fewer measured: features are added.")
+      .def_readwrite("max_added", &O::max_added, "In one frame; the first one fills up to min_visible.")
+      .def_readwrite("grid_columns", &O::grid_columns, "The picture's cells, over which new features are spread.")
+      .def_readwrite("grid_rows", &O::grid_rows, "The same.")
+      .def_readwrite("min_separation_px", &O::min_separation_px, "Of a new feature from those in the map [px].")
+      .def_readwrite("border_px", &O::border_px, "Predicted nearer to the border: not expected to be seen [px].")
+      .def_readwrite("inverse_depth", &O::inverse_depth, "Of a new feature (rho_0) [1/m].")
+      .def_readwrite("sigma_inverse_depth", &O::sigma_inverse_depth,
+                     "Its deviation (sigma_rho); 0 must lie well within 2 sigma [1/m].")
+      .def_readwrite("depth_from_neighbours", &O::depth_from_neighbours,
+                     "rho_0 of a new feature is the median of those that are known; its deviation grows with it.")
+      .def_readwrite("max_linearity_index", &O::max_linearity_index, "Below it a feature becomes XYZ; 0: never.")
+      .def_readwrite("delete_after_tries", &O::delete_after_tries,
+                     "Frames in which a feature was expected, before it is judged.")
+      .def_readwrite("delete_below_ratio", &O::delete_below_ratio, "Measured in less than this share of them: deleted.")
+      .def("check", &O::check, "ValueError names a field that is out of range.");
+}
+
+void bind_association_options(py::module_& m) {
+  using O = SlamAssociationOptions;
+  py::class_<O>(m, "SlamAssociationOptions",
+                "Which measurements are believed; every field is a keyword of the constructor.")
+      .def(py::init([](const py::kwargs& fields) { return with_fields<O>("SlamAssociationOptions", fields); }),
+           "TypeError for an unknown field, ValueError for a value out of range.")
+      .def_readwrite("gate_probability", &O::gate_probability, "Of a right measurement to pass: chi-square of 2.")
+      .def_readwrite("ransac", &O::ransac, "Hypotheses from one measurement each; without it the gate alone.")
+      .def_readwrite("ransac_probability", &O::ransac_probability, "Of having tried one right measurement at least.")
+      .def_readwrite("max_hypotheses", &O::max_hypotheses)
+      .def_readwrite("seed", &O::seed, "Of the draws.")
+      .def("check", &O::check, "ValueError names a field that is out of range.");
+}
+
+void bind_landmark(py::module_& m) {
+  py::class_<KnownLandmark> c(m, "KnownLandmark",
+                              "A point whose place in world is known: it gives the scale and ties the world.");
+  c.def(py::init([](std::int64_t id, const ArrayLike& position, double sigma) {
+          return KnownLandmark{.id = id, .position = vector3(position, "position"), .sigma = sigma};
+        }),
+        py::arg("id"), py::arg("position"), py::arg("sigma") = KnownLandmark{}.sigma)
+      .def_readwrite("id", &KnownLandmark::id)
+      .def_readwrite("sigma", &KnownLandmark::sigma, "Of each coordinate [m].");
+  vector_property(c, "position", &KnownLandmark::position, "(3,) in world [m]");
+}
+
+/// As with_fields, but without check(): the default has no camera, and is there to be filled in.
+std::unique_ptr<SlamOptions> slam_options(const py::kwargs& fields) {
+  auto value = std::make_unique<SlamOptions>();
+  set_fields("SlamOptions", *value, fields);
+  if (fields.contains("camera")) value->check();
+  return value;
+}
+
+void bind_slam_options_struct(py::module_& m) {
+  using O = SlamOptions;
+  py::class_<O> c(m, "SlamOptions",
+                  "Options of MonoSlam and InertialSlam; every field is a keyword of the constructor: "
+                  "SlamOptions(camera=rig.cameras[0], sigma_px=0.5). Structs inside can be changed in place: "
+                  "options.map.max_features = 60.");
+  c.def(py::init(&slam_options),
+        "TypeError for an unknown field; ValueError for a value out of range, once a camera is given.")
+      .def("__copy__", [](const O& o) { return O(o); })
+      .def(
+          "__deepcopy__", [](const O& o, const py::dict& /*memo*/) { return O(o); }, py::arg("memo"))
+      .def_readwrite("motion", &O::motion)
+      .def_readwrite("consistency", &O::consistency)
+      .def_readwrite("precision", &O::precision)
+      .def_readwrite("camera", &O::camera,
+                     "CameraCalibration: K with distortion, pose in body, clock. Without an IMU body is what moves "
+                     "smoothly; T_body_camera may be the identity.")
+      .def_readwrite("camera_index", &O::camera_index, "Which frames are ours.");
+  vector_property(c, "position", &O::position, "Start: of body in world (3,) (X_cam) [m].");
+  c.def_property(
+      "q_world_body_wxyz", [](const O& o) { return to_wxyz(o.q_world_body); },
+      [](O& o, const ArrayLike& q) { o.q_world_body = quaternion(q, "q_world_body_wxyz"); },
+      "Start (4,) (X_cam_rotation). Default: a camera with T_body_camera = I looks along x of a world with z up.");
+  vector_property(c, "velocity", &O::velocity, "Start: in world (3,) (X_cam_velocity) [m/s].");
+  vector_property(c, "angular_velocity", &O::angular_velocity, "Start: in body (3,) (X_cam_angular_velocity) [rad/s].");
+  c.def_readwrite("sigma_position", &O::sigma_position, "Of the start [m]; 0: world is where the camera began.")
+      .def_readwrite("sigma_orientation", &O::sigma_orientation, "Of the start [rad].")
+      .def_readwrite("sigma_velocity", &O::sigma_velocity, "Of the start, root of P_velocity [m/s].")
+      .def_readwrite("sigma_angular_velocity", &O::sigma_angular_velocity, "Of the start, root of P_angular [rad/s].")
+      .def_readwrite("acceleration_density", &O::acceleration_density, "Q, camera alone [m/s^2/sqrt(Hz)].")
+      .def_readwrite("angular_acceleration_density", &O::angular_acceleration_density,
+                     "Q, camera alone [rad/s^2/sqrt(Hz)].")
+      .def_readwrite("imu_noise", &O::imu_noise, "Q, with an IMU; biases begin with its deviations.")
+      .def_readwrite("gravity", &O::gravity, "[m/s^2]")
+      .def_readwrite("sigma_px", &O::sigma_px, "R: deviation of one coordinate, of frames that do not say [px].")
+      .def_readwrite("override_sigma", &O::override_sigma, "sigma_px also in place of what frames say.")
+      .def_readwrite("estimate_extrinsics", &O::estimate_extrinsics, "T_body_camera is part of the state.")
+      .def_readwrite("sigma_extrinsic_rotation", &O::sigma_extrinsic_rotation, "[rad]")
+      .def_readwrite("sigma_extrinsic_position", &O::sigma_extrinsic_position, "[m]")
+      .def_readwrite("estimate_time_offset", &O::estimate_time_offset, "So is camera.time_offset_s.")
+      .def_readwrite("sigma_time_offset", &O::sigma_time_offset, "[s]")
+      .def_property(
+          "landmarks", [](const O& o) { return o.landmarks; },
+          [](O& o, std::vector<KnownLandmark> landmarks) { o.landmarks = std::move(landmarks); },
+          "Copies of the known landmarks: assign a list to change them.")
+      .def_readwrite("map", &O::map, "SlamMapOptions")
+      .def_readwrite("association", &O::association, "SlamAssociationOptions")
+      .def_readwrite("max_gap_s", &O::max_gap_s,
+                     "Camera alone: after a longer pause between frames the motion is unknown [s].")
+      .def("check", &O::check, "ValueError names a field that is out of range.");
+}
+
+Eigen::Matrix<double, loc::kInverseDepthDim, 1> error6(const ArrayLike& array) {
+  return matrix(array, "error", loc::kInverseDepthDim, 1);
+}
+
+void bind_inverse_depth(py::module_& m) {
+  using P = InverseDepthPoint;
+  py::class_<P> c(m, "InverseDepthPoint",
+                  "A point by the ray on which it was first seen: anchor + ray / inverse_depth. Its errors are six "
+                  "numbers: anchor, two of the ray along ray_basis, inverse depth.");
+  c.def(py::init([](const ArrayLike& anchor, const ArrayLike& ray, double inverse_depth) {
+          const Eigen::Vector3d direction = vector3(ray, "ray");
+          if (!direction.allFinite() || direction.norm() == 0) throw py::value_error("ray must be finite and not zero");
+          return P{.anchor = vector3(anchor, "anchor"),
+                   .frame = loc::frame_of_ray(direction),
+                   .inverse_depth = inverse_depth};
+        }),
+        py::arg("anchor"), py::arg("ray"), py::arg("inverse_depth"),
+        "anchor (3,) in world [m], ray (3,) in world, of any length, inverse_depth [1/m] of the distance.");
+  vector_property(c, "anchor", &P::anchor, "(3,) in world [m]");
+  c.def_property(
+       "frame_wxyz", [](const P& p) { return to_wxyz(p.frame); },
+       [](P& p, const ArrayLike& q) { p.frame = quaternion(q, "frame_wxyz"); },
+       "(4,): its third axis in world is the ray, the errors of the ray are along the first two.")
+      .def_readwrite("inverse_depth", &P::inverse_depth, "[1/m], of the distance")
+      .def_property_readonly(
+          "ray", [](const P& p) { return to_array(p.ray()); }, "(3,) unit vector in world")
+      .def_property_readonly("azimuth", &P::azimuth, "[rad], of a world with y down, as in the source")
+      .def_property_readonly("elevation", &P::elevation, "[rad]")
+      .def(
+          "ray_basis", [](const P& p) { return to_matrix_array(p.ray_basis()); },
+          "(3, 2), derivative of the ray by its two errors")
+      .def(
+          "xyz", [](const P& p) { return to_array(p.xyz()); }, "(3,) in world [m]; not finite when inverse_depth is 0.")
+      .def(
+          "xyz_jacobian", [](const P& p) { return to_matrix_array(p.xyz_jacobian()); },
+          "(3, 6), derivative of xyz() by the errors")
+      .def(
+          "boxplus",
+          [](const P& p, const ArrayLike& error) {
+            P out = p;
+            out.boxplus(error6(error));
+            return out;
+          },
+          py::arg("error"), "The point with the error (6,) applied.")
+      .def(
+          "linearity_index",
+          [](const P& p, double sigma, const ArrayLike& camera) {
+            return loc::linearity_index(p, sigma, vector3(camera, "camera"));
+          },
+          py::arg("sigma_inverse_depth"), py::arg("camera"),
+          "How far the point is from having a Gaussian error in XYZ, seen from camera (3,) [m]; infinity for an "
+          "inverse depth that is not positive.");
+}
+
+}  // namespace
+
+void bind_slam_options(py::module_& m) {
+  bind_enumerations(m);
+  bind_map_options(m);
+  bind_association_options(m);
+  bind_landmark(m);
+  bind_slam_options_struct(m);
+  bind_inverse_depth(m);
+}
+
+}  // namespace locpy
