@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -84,6 +86,11 @@ SlamInput input_of(const FrameArguments& frames, const ImuArguments& imu, const 
   if (frames.camera) {
     in.cameras = numbers(*frames.camera, "camera");
     one_or_many(in.cameras->size(), "camera");
+    for (const double value : std::span(in.cameras->data(), static_cast<std::size_t>(in.cameras->size()))) {
+      if (!(value >= 0 && value < 1e6 && value == std::floor(value))) {
+        throw py::value_error("camera = " + py::repr(py::float_(value)).cast<std::string>() + ": must be an index");
+      }
+    }
   }
   if (frames.sigma_px) {
     in.sigmas = numbers(*frames.sigma_px, "sigma_px");
@@ -105,7 +112,9 @@ SlamInput input_of(const FrameArguments& frames, const ImuArguments& imu, const 
 class Progress {
  public:
   Progress(std::optional<py::function> callback, std::size_t total)
-      : callback_(std::move(callback)), total_(total), last_(std::chrono::steady_clock::now()) {}
+      : callback_(std::move(callback)),
+        total_(total),
+        last_(std::chrono::steady_clock::now() - std::chrono::seconds(1)) {}
 
   /// Without the GIL. @returns false: stop. @throws py::error_already_set
   bool go_on(std::size_t done) {
@@ -192,6 +201,7 @@ SlamRun PySlam<Slam>::run(const SlamInput& in, std::optional<py::function> callb
   }
   SlamRun out = columns.take();
   out.map = arrays_of(map);
+  out.totals = as_map(slam.counts());
   out.stopped = !go_on;
   return out;
 }

@@ -278,6 +278,7 @@ void bind_run(py::module_& m) {
       .def_readonly("nis_dim", &R::nis_dim, "(N,) numbers in it")
       .def_readonly("time_spent_s", &R::time_spent_s, "(N,) by the filter")
       .def_readonly("counts", &R::counts, "{field of SlamCounts: (N,) int64}")
+      .def_readonly("totals", &R::totals, "counts() of the estimator at the end: what was used and skipped, and why")
       .def_readonly("first", &R::first, "(N + 1,): features of frame i are rows first[i]:first[i + 1]")
       .def_readonly("features", &R::features, "SlamFeatureArrays of all frames, when asked for")
       .def_readonly("map", &R::map, "SlamMapArrays, at the end")

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "arrays.hpp"
@@ -42,6 +44,7 @@ struct SlamRun {
   py::array_t<double> reprojection_before_px, reprojection_after_px, nis, time_spent_s;
   py::array_t<std::int32_t> nis_dim;
   py::dict counts;
+  std::map<std::string, std::int64_t> totals;
   py::array_t<std::int64_t> first;
   SlamFeatureArrays features;
   SlamMapArrays map;

@@ -9,5 +9,9 @@ from libloc._core import so3 as so3
 from libloc.recordings import file_format as file_format
 from libloc.recordings import open_recording as open_recording
 from libloc.recordings import read_recording as read_recording
+from libloc.slam import FrameFeatures as FrameFeatures
+from libloc.slam import features_of_frames as features_of_frames
+from libloc.slam import features_of_tracks as features_of_tracks
+from libloc.slam import run_slam as run_slam
 
 __version__ = "0.3.0"

@@ -96,8 +96,8 @@ def run_slam(
     """Runs the estimator that options.motion names over a recording; other cameras' frames are passed over.
 
     rig: its calibration is applied to the IMU. progress(frames done, frames in all) is called a few times in
-    a second; when it returns False the run ends, with what there is. Raises ValueError when the recording lacks
-    what the estimator needs; DataError when it cannot be read.
+    a second; when it returns False the run ends, with what there is. Raises ValueError when the recording
+    lacks what the estimator needs; DataError when it cannot be read.
     """
     if isinstance(recording, MeasurementSource):
         recording = recording.read_all()

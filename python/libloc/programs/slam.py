@@ -1,0 +1,229 @@
+"""loc-slam: where a camera was and what it saw, from features with identities; off line.
+
+INPUT is a tracks file (rows `frame feature dimension value`) or a recording with features (LCM log,
+loc-simulate's folder or log); its content tells. --config is the rig file with the camera's calibration.
+
+mono-slam needs nothing but the camera: lengths are in a unit of their own then, and the world is where the
+camera began, which looks along x with z up. --output gets the trajectory (TUM, see --pose), the map (PLY),
+a CSV with a line for each frame, summary.txt and summary.json, and pictures. Where there is truth
+(--reference, or in the recording) the trajectory is compared with it after an alignment: similarity for a
+camera alone, rigid where lengths are metres.
+
+Exit codes: 0 done, 1 the data cannot be used (the message says why), 2 wrong options, 130 interrupted: what
+there was by then is written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import TextIO
+
+import numpy as np
+
+import libloc
+from libloc import DataError
+from libloc.programs.slam_input import METHODS, read_input, slam_options
+from libloc.programs.slam_result import SlamResult, against_truth, report, text_of, write
+
+EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not (np.isfinite(value) and value > 0):
+        raise argparse.ArgumentTypeError(f"{text}: must be a positive number")
+    return value
+
+
+def _index(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text}: must not be negative")
+    return value
+
+
+def make_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="loc-slam", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--version", action="version", version=libloc.__version__)
+    parser.add_argument("input", type=Path, metavar="INPUT", help="tracks file or recording")
+    parser.add_argument(
+        "--config",
+        type=Path,
+        required=True,
+        metavar="RIG",
+        help="calibration of the sensors: rig.yaml, Kalibr's camchain, EuRoC's sensor.yaml",
+    )
+    parser.add_argument("--method", choices=tuple(METHODS), default="mono-slam", help="(%(default)s)")
+    parser.add_argument(
+        "--camera", type=_index, default=0, metavar="N", help="index in the rig (%(default)s)"
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="a field of SlamOptions, may come several times: --set map.max_features=60",
+    )
+    parser.add_argument(
+        "--sigma-px",
+        type=_positive,
+        metavar="PX",
+        help="deviation of a measured coordinate (default: what the recording says, else 1)",
+    )
+    parser.add_argument(
+        "--rate-hz",
+        type=_positive,
+        metavar="HZ",
+        help="frames a second of a tracks file (default: rate_hz of the camera in --config)",
+    )
+    group = parser.add_argument_group("truth")
+    group.add_argument(
+        "--reference",
+        type=Path,
+        metavar="FILE",
+        help="TUM trajectory or recording (default: INPUT's own, if any)",
+    )
+    group.add_argument(
+        "--align",
+        choices=("auto", "none", "se3", "sim3", "yaw"),
+        default="auto",
+        help="before the comparison; auto: sim3 where the scale is not known, otherwise se3",
+    )
+    group = parser.add_argument_group("result")
+    group.add_argument("--output", type=Path, metavar="DIR", help="write everything into this folder")
+    group.add_argument(
+        "--pose",
+        choices=("body", "camera"),
+        default="body",
+        help="of the trajectory that is written (%(default)s)",
+    )
+    group.add_argument("--no-plots", action="store_true", help="no pictures")
+    return parser
+
+
+class _PlainBar:
+    """Progress as a line of text that is written over."""
+
+    def __init__(self, file: TextIO) -> None:
+        self._file = file
+        self._began = time.monotonic()
+
+    def __call__(self, done: int, total: int) -> None:
+        left = (time.monotonic() - self._began) * (total - done) / max(done, 1)
+        print(
+            f"\rloc-slam: {done} of {total} frames, {left:.0f} s left ", end="", file=self._file, flush=True
+        )
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[int, int], None]]:
+    """Tells how far it is on the error stream, where that is a terminal: a bar with rich, text without it."""
+    if not sys.stderr.isatty():
+        yield lambda done, total: None
+        return
+    try:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    except ImportError:
+        yield _PlainBar(sys.stderr)
+        print(file=sys.stderr)
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("loc-slam", total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+@contextmanager
+def _interrupt() -> Iterator[Callable[[], bool]]:
+    """The first Ctrl-C within only sets what the given function tells; the next one ends the program."""
+    asked = False
+
+    def handler(signum: int, frame: FrameType | None) -> None:
+        nonlocal asked
+        asked = True
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    before = signal.signal(signal.SIGINT, handler)
+    try:
+        yield lambda: asked
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def run(options: argparse.Namespace) -> SlamResult:
+    """Raises DataError (ValueError) for data or options that cannot be used."""
+    given = read_input(options)
+    for block, verdict, sentence in given.rig.doubts():
+        print(
+            f"loc-slam: warning: {options.config}: {block} ({verdict.name.lower()}): {sentence}",
+            file=sys.stderr,
+        )
+    slam = slam_options(options, given.rig)
+    began = time.monotonic()
+    with _interrupt() as interrupted, _progress() as progress:
+
+        def go_on(done: int, total: int) -> bool:
+            progress(done, total)
+            return not interrupted()
+
+        ran = libloc.run_slam(given.recording, slam, rig=given.rig, progress=go_on)
+    elapsed_s = time.monotonic() - began
+    truth, failure = None, ""
+    if given.reference is not None:
+        try:
+            truth = against_truth(ran, given.reference, options.align, metric=not _scale_unknown(ran))
+        except DataError as error:
+            failure = str(error)
+    frames = int(np.sum(np.asarray(given.features.camera) == options.camera))
+    return SlamResult(given, options.method, slam, ran, frames, truth, failure, elapsed_s)
+
+
+def _scale_unknown(ran: libloc.SlamRun) -> bool:
+    return bool(np.any(ran.status & libloc.EstimateStatus.SCALE_UNKNOWN))
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = make_parser()
+    options = parser.parse_args(arguments)
+    if options.output is not None and options.output.exists() and not options.output.is_dir():
+        parser.error(f"--output {options.output}: is not a folder")
+    try:
+        if options.output is not None:
+            options.output.mkdir(parents=True, exist_ok=True)  # before the work, not after it
+        result = run(options)
+        out = report(result)
+        print(text_of(out))
+        if options.output is not None:
+            for path in write(result, out, options.pose, not options.no_plots, options.output):
+                print(f"written: {path}")
+    except (DataError, ValueError, OSError) as error:
+        print(f"loc-slam: {error}", file=sys.stderr)
+        return EXIT_FAILED
+    except KeyboardInterrupt:
+        print("loc-slam: interrupted", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    if result.run.stopped:
+        print(
+            f"loc-slam: interrupted after {len(result.run)} of {result.frames} frames: all figures and files "
+            "are of these",
+            file=sys.stderr,
+        )
+        return EXIT_INTERRUPTED
+    if len(result.run) == 0:
+        print("loc-slam: no frame could be used", file=sys.stderr)
+        return EXIT_FAILED
+    return EXIT_OK
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,160 @@
+"""What loc-slam reads: features with identities from a tracks file or a recording; rig, options, truth."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass, field
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import libloc
+from libloc import DataError, SlamMotion, SlamOptions
+from libloc.programs.evaluate_input import Poses, normalised, read_reference
+
+# The methods as loc-estimator calls them.
+METHODS = {"mono-slam": SlamMotion.CONSTANT_VELOCITY}
+# Of a camera that looks along x of a world with z up.
+_Q_WORLD_CAMERA = (0.5, -0.5, 0.5, -0.5)
+
+
+@dataclass
+class SlamInput:
+    path: Path
+    form: str  # "tracks", or as libloc.file_format names it
+    recording: libloc.Recording | libloc.FrameFeatures
+    rig: libloc.Rig
+    reference: Poses | None
+    counts: dict[str, int] = field(default_factory=dict)  # what was read and skipped, and why
+
+    @property
+    def features(self) -> libloc.FeaturesArrays | libloc.FrameFeatures:
+        if isinstance(self.recording, libloc.Recording):
+            return self.recording.features
+        return self.recording
+
+
+def _is_tracks_file(path: Path) -> bool:
+    """Four numbers a line; a TUM trajectory has eight."""
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for line in file:
+            data = line.split("#", 1)[0].split()
+            if data:
+                return len(data) == 4
+    return False
+
+
+def _read_tracks(path: Path, options: argparse.Namespace, rate_hz: float) -> SlamInput:
+    if not rate_hz > 0:
+        raise DataError(
+            f"{path}: a tracks file has no times: give --rate-hz, or rate_hz of the camera in --config"
+        )
+    frame, feature, pixel_px, counts = libloc.read_tracks(path)
+    features = libloc.features_of_tracks(frame, feature, pixel_px, rate_hz=rate_hz, camera=options.camera)
+    return SlamInput(path, "tracks", features, libloc.Rig(), None, counts)
+
+
+def _own_reference(path: Path, form: str, recording: libloc.Recording) -> Poses | None:
+    """The truth in the recording, if it has places."""
+    r = recording.reference
+    if not np.isfinite(r.position).all(axis=1).any():
+        return None
+    keep = np.ones(len(r.times_ns), dtype=bool)
+    keep[1:] = r.times_ns[1:] > np.maximum.accumulate(r.times_ns)[:-1]
+    return Poses(
+        path,
+        form,
+        r.times_ns[keep],
+        normalised(r.q_world_body_wxyz, path)[keep],
+        r.position[keep],
+        r.score[keep],
+    )
+
+
+def read_input(options: argparse.Namespace) -> SlamInput:
+    """Raises DataError naming file, line, field and value."""
+    path: Path = options.input
+    rig = libloc.read_any_rig(options.config)
+    if options.camera >= len(rig.cameras):
+        raise DataError(f"{options.config}: has {len(rig.cameras)} cameras, --camera is {options.camera}")
+    form = libloc.file_format(path)
+    if form == "tum" and _is_tracks_file(path):
+        given = _read_tracks(path, options, options.rate_hz or rig.cameras[options.camera].rate_hz)
+    else:
+        if options.rate_hz is not None:
+            raise DataError(f"{path}: is a recording with times of its own, --rate-hz is for tracks files")
+        recording = libloc.read_recording(path)
+        reference = None if options.reference else _own_reference(path, form, recording)
+        given = SlamInput(path, form, recording, rig, reference, recording.counts)
+    given.rig = rig
+    if not np.any(np.asarray(given.features.camera) == options.camera):
+        cameras = sorted(set(given.features.camera.tolist()))
+        held = f"those of cameras {cameras}" if cameras else "none at all"
+        if isinstance(given.recording, libloc.Recording) and given.recording.images:
+            held += f", and {given.recording.images} pictures, which are not searched for features"
+        raise DataError(f"{path}: no features of camera {options.camera} in it; it holds {held}")
+    if options.reference:
+        given.reference = read_reference(options.reference)
+        if not given.reference.has_position().any():
+            raise DataError(f"{options.reference}: no positions in it")
+    return given
+
+
+def _parsed(old: Any, text: str) -> Any:
+    """Text as a value of the same type as the old one."""
+    if isinstance(old, bool):
+        if text not in ("true", "false"):
+            raise ValueError("must be true or false")
+        return text == "true"
+    if isinstance(old, IntEnum):
+        names = {name.lower().replace("_", "-"): value for name, value in type(old).__members__.items()}
+        if text not in names:
+            raise ValueError(f"must be one of {', '.join(names)}")
+        return names[text]
+    if isinstance(old, int):
+        return int(text)
+    if isinstance(old, float):
+        return float(text)
+    if isinstance(old, np.ndarray):
+        values = [float(x) for x in text.split(",")]
+        if len(values) != len(old):
+            raise ValueError(f"must be {len(old)} numbers with commas between them")
+        return values
+    raise ValueError("cannot be set here")
+
+
+def set_option(options: SlamOptions, setting: str) -> None:
+    """NAME=VALUE, with names as in SlamOptions: map.max_features=60. Raises ValueError naming it."""
+    name, separator, text = setting.partition("=")
+    *outer, last = name.split(".")
+    target: Any = options
+    for part in outer:
+        target = getattr(target, part, None)
+    if not separator or not hasattr(target, last) or callable(getattr(target, last)):
+        raise ValueError(f"--set {setting}: must be NAME=VALUE, with a field of SlamOptions")
+    try:
+        setattr(target, last, _parsed(getattr(target, last), text))
+    except ValueError as error:
+        raise ValueError(f"--set {setting}: {error}") from None
+
+
+def slam_options(options: argparse.Namespace, rig: libloc.Rig) -> SlamOptions:
+    """Camera and noise of the rig, what the command line says. Raises ValueError naming a field."""
+    out = SlamOptions()
+    out.motion = METHODS[options.method]
+    out.camera = rig.cameras[options.camera]
+    out.camera_index = options.camera
+    if rig.imu is not None:
+        out.imu_noise = rig.imu.noise
+    if out.motion == SlamMotion.CONSTANT_VELOCITY:
+        start = libloc.Pose3(_Q_WORLD_CAMERA) * out.camera.T_body_camera.inverse()
+        out.q_world_body_wxyz = start.rotation_wxyz
+    if options.sigma_px is not None:
+        out.sigma_px = options.sigma_px
+        out.override_sigma = True
+    for setting in options.set:
+        set_option(out, setting)
+    out.check()
+    return out

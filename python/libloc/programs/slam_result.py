@@ -1,0 +1,342 @@
+"""What loc-slam makes of a run: errors against the truth, figures, and the files with them."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import libloc
+from libloc import EstimateStatus, EstimateValid, SlamRun
+from libloc.programs.evaluate_input import Poses
+from libloc.programs.slam_input import SlamInput
+
+_FAR = 1e9  # [m]: what is farther is as good as at infinity
+
+
+@dataclass
+class TruthResult:
+    """The estimates that have a true pose at their time, aligned with it."""
+
+    absolute: libloc.AbsoluteError
+    mode: str  # of the alignment: "none", "se3", "sim3", "yaw"
+    rows: NDArray[np.intp]  # of the run
+    times_ns: NDArray[np.int64]
+    estimate: NDArray[np.float64]  # (N, 3), aligned [m]
+    reference: NDArray[np.float64]  # (N, 3) [m]
+    sigma: NDArray[np.float64]  # (N, 3), deviations that the filter states, in the reference's axes [m]
+    without_partner: int
+    length_m: float  # of the true path
+
+    def to_reference(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
+        alignment = self.absolute.alignment
+        return alignment.T_reference_estimate.transform(np.ascontiguousarray(alignment.scale * position))
+
+    def covariance_to_reference(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+        alignment = self.absolute.alignment
+        rotation = alignment.T_reference_estimate.matrix()[:3, :3]
+        return alignment.scale**2 * rotation @ covariance @ rotation.T
+
+
+@dataclass
+class SlamResult:
+    given: SlamInput
+    method: str
+    options: libloc.SlamOptions
+    run: SlamRun
+    frames: int  # that were there for it
+    truth: TruthResult | None
+    truth_failure: str  # why there is none though there is a reference
+    elapsed_s: float
+
+    @property
+    def unit(self) -> str:
+        """Of lengths as they are shown."""
+        return "m" if self.metric or self.truth is not None else "unit of its own"
+
+    @property
+    def metric(self) -> bool:
+        return not np.any(self.run.status & EstimateStatus.SCALE_UNKNOWN)
+
+
+def known_rows(run: SlamRun) -> NDArray[np.bool]:
+    wanted = EstimateValid.POSITION | EstimateValid.ORIENTATION
+    return (run.valid & wanted) == wanted
+
+
+def against_truth(run: SlamRun, reference: Poses, mode: str, metric: bool) -> TruthResult:
+    """Raises DataError when nothing pairs, or the poses do not determine the alignment."""
+    if mode == "auto":
+        mode = "se3" if metric else "sim3"
+    rows = np.flatnonzero(known_rows(run))
+    truth = reference.has_position() & reference.has_orientation() & reference.score
+    if len(rows) < 3 or not truth.any():
+        raise libloc.DataError(
+            f"{len(rows)} estimates and {truth.sum()} true poses are too few to be compared"
+        )
+    estimate = libloc.Trajectory(run.time_ns[rows], run.q_world_body_wxyz[rows], run.position[rows])
+    true_path = reference.trajectory(truth)
+    spacing_ns = int(np.median(np.diff(true_path.times_ns))) if len(true_path) > 1 else 0
+    pairs = libloc.associate(
+        estimate,
+        true_path,
+        max_difference_ns=max(10_000_000, spacing_ns),
+        interpolate_reference=True,
+        one_to_one=False,
+    )
+    absolute = libloc.absolute_error(pairs.estimate, pairs.reference, mode)
+    rows = rows[pairs.estimate_index]
+    out = TruthResult(
+        absolute=absolute,
+        mode=mode,
+        rows=rows,
+        times_ns=pairs.estimate.times_ns,
+        estimate=np.empty(0),
+        reference=pairs.reference.position,
+        sigma=np.empty(0),
+        without_partner=pairs.without_partner,
+        length_m=float(np.linalg.norm(np.diff(pairs.reference.position, axis=0), axis=1).sum()),
+    )
+    out.estimate = out.to_reference(pairs.estimate.position)
+    covariance = out.covariance_to_reference(run.covariance[rows, 3:6, 3:6])
+    out.sigma = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0))
+    return out
+
+
+def sigma_of_points(position_cov: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(K,) largest deviation in any direction; NaN where it is not known, or beyond all measure."""
+    out = np.full(len(position_cov), np.nan)
+    good = np.isfinite(position_cov).all(axis=(1, 2))
+    good[good] = np.abs(position_cov[good]).max(axis=(1, 2)) < _FAR**2
+    if good.any():
+        out[good] = np.sqrt(np.maximum(np.linalg.eigvalsh(position_cov[good])[:, -1], 0))
+    return out
+
+
+def _mean_square(values: NDArray[np.float64]) -> float | None:
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(finite**2))) if len(finite) else None
+
+
+def report(result: SlamResult) -> dict[str, Any]:
+    """All figures; what is not known is None."""
+    run, given = result.run, result.given
+    used = run.nis_dim > 0
+    out: dict[str, Any] = {
+        "input": {"file": str(given.path), "format": given.form, "counts": given.counts},
+        "method": result.method,
+        "finished": not run.stopped,
+        "frames": {"in_input": result.frames, "used": len(run)},
+        "metric": result.metric,
+        "estimator": run.totals,
+        "elapsed_s": result.elapsed_s,
+    }
+    if len(run) == 0:
+        return out
+    ms = 1e3 * run.time_spent_s
+    steps = np.diff(run.position[known_rows(run)], axis=0)
+    out |= {
+        "first_time_s": libloc.format_seconds(run.time_ns[0]),
+        "last_time_s": libloc.format_seconds(run.time_ns[-1]),
+        "path_length": float(np.linalg.norm(steps, axis=1).sum()),
+        "filter_ms_per_frame": {
+            "mean": float(ms.mean()),
+            "p95": float(np.percentile(ms, 95)),
+            "max": float(ms.max()),
+        },
+        "reprojection_px": {
+            "before": _mean_square(run.reprojection_before_px),
+            "after": _mean_square(run.reprojection_after_px),
+        },
+        "nis_per_dimension": float(run.nis[used].sum() / run.nis_dim[used].sum()) if used.any() else None,
+        "map": {
+            "points": len(run.map),
+            "xyz": int(run.map.converted.sum()),
+            "with_position": int(np.isfinite(run.map.position).all(axis=1).sum()),
+        },
+        "status": {
+            flag.name.lower(): int(np.sum(run.status & flag != 0))
+            for flag in EstimateStatus
+            if np.any(run.status & flag)
+        },
+    }
+    if result.truth is not None:
+        truth = result.truth
+        error = truth.absolute
+        sigmas = np.abs(truth.estimate - truth.reference) / np.where(truth.sigma > 0, truth.sigma, np.nan)
+        sigmas = sigmas[np.isfinite(sigmas)]
+        out["truth"] = {
+            "file": str(given.reference.path) if given.reference else None,
+            "alignment": truth.mode,
+            "scale": error.alignment.scale,
+            "pairs": len(truth.rows),
+            "without_partner": truth.without_partner,
+            "path_length_m": truth.length_m,
+            "rmse_m": error.translation.rmse,
+            "max_m": error.translation.max,
+            "rotation_rmse_deg": float(np.rad2deg(error.rotation.rmse)),
+            "share_within_3_sigma": float(np.mean(sigmas < 3)) if len(sigmas) else None,
+        }
+    elif result.truth_failure:
+        out["truth_failure"] = result.truth_failure
+    return out
+
+
+def text_of(out: dict[str, Any]) -> str:
+    lines = []
+
+    def line(label: str, text: str) -> None:
+        lines.append(f"{label:14s} {text}")
+
+    frames = out["frames"]
+    line("input", f"{out['input']['file']} ({out['input']['format']})")
+    ending = "" if out["finished"] else ": interrupted, this is what there was"
+    line("frames", f"{frames['used']} used of {frames['in_input']}{ending}")
+    if "map" not in out:
+        return "\n".join(lines)
+    unit = "m" if out["metric"] else "units of its own: one camera cannot tell metres"
+    line("method", f"{out['method']}, {out['first_time_s']} to {out['last_time_s']} s")
+    line("path", f"{out['path_length']:.3f} {unit}")
+    ms = out["filter_ms_per_frame"]
+    line("filter", f"{ms['mean']:.3f} ms a frame, 95 % below {ms['p95']:.3f}, longest {ms['max']:.3f}")
+    px = out["reprojection_px"]
+    if px["before"] is not None:
+        line("reprojection", f"{px['before']:.3f} px before the update, {px['after']:.3f} px after it (rms)")
+        line("NIS", f"{out['nis_per_dimension']:.3f} per dimension (1 is right)")
+    m = out["map"]
+    line("map", f"{m['points']} points, {m['xyz']} of them as XYZ")
+    if out["status"]:
+        line("status", ", ".join(f"{name} {count}" for name, count in out["status"].items()) + " (frames)")
+    if "truth" in out:
+        t = out["truth"]
+        scale = f", scale {t['scale']:.6f}" if t["alignment"] == "sim3" else ""
+        line(
+            "truth",
+            f"{t['rmse_m']:.4f} m rmse, {t['max_m']:.4f} m at most, {t['rotation_rmse_deg']:.3f} deg; "
+            f"{t['pairs']} poses over {t['path_length_m']:.2f} m, alignment {t['alignment']}{scale}",
+        )
+        if t["share_within_3_sigma"] is not None:
+            line(
+                "",
+                f"{100 * t['share_within_3_sigma']:.1f} % of the errors are within 3 sigma (99.7 % is right)",
+            )
+    elif "truth_failure" in out:
+        line("truth", f"not compared: {out['truth_failure']}")
+    return "\n".join(lines)
+
+
+def _vector(prefix: str, unit: str, axes: str = "xyz") -> list[str]:
+    return [f"{prefix}{axis}{unit}" for axis in axes]
+
+
+def frame_columns(run: SlamRun) -> dict[str, NDArray[Any]]:
+    """Everything that SlamFrame says, by the names of the columns; those of the pose are loc-estimator's."""
+    out: dict[str, NDArray[Any]] = {
+        "time_ns": run.time_ns,
+        "sequence": run.sequence,
+        "valid": run.valid,
+        "status": run.status,
+    }
+
+    def add(names: list[str], values: NDArray[Any]) -> None:
+        out.update(zip(names, values.T, strict=True))
+
+    add(["qw", "qx", "qy", "qz"], run.q_world_body_wxyz)
+    add(_vector("p", "_m"), run.position)
+    add(_vector("v", "_m_s"), run.velocity)
+    add(_vector("w", "_rad_s"), run.angular_velocity)
+    add(_vector("bg", "_rad_s"), run.gyroscope_bias)
+    add(_vector("ba", "_m_s2"), run.accelerometer_bias)
+    sigma = np.full((len(run), 15), np.nan)
+    dim = run.covariance.shape[1]
+    sigma[:, :dim] = np.sqrt(np.maximum(np.diagonal(run.covariance, axis1=1, axis2=2), 0))
+    units = {"theta": "_rad", "p": "_m", "v": "_m_s", "bg": "_rad_s", "ba": "_m_s2"}
+    for k, (name, unit) in enumerate(units.items()):
+        add(_vector(f"sigma_{name}", unit), sigma[:, 3 * k : 3 * k + 3])
+    add([f"camera_{name}" for name in ("qw", "qx", "qy", "qz")], run.q_world_camera_wxyz)
+    add(_vector("camera_p", "_m"), run.camera_position)
+    for name in ("reprojection_before_px", "reprojection_after_px", "nis", "nis_dim"):
+        out[name] = getattr(run, name)
+    out.update(run.counts)
+    out["time_spent_s"] = run.time_spent_s
+    return out
+
+
+def write_frames(run: SlamRun, path: Path) -> None:
+    """CSV, a line for each frame; every number reads back as the same one, an empty cell is not known."""
+    columns = frame_columns(run)
+    cells = [
+        [str(v) for v in values.tolist()]
+        if values.dtype.kind in "iu"
+        else [repr(v) if math.isfinite(v) else "" for v in values.tolist()]
+        for values in columns.values()
+    ]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.write(",".join(columns) + "\n")
+        file.writelines(",".join(row) + "\n" for row in zip(*cells, strict=True))
+
+
+def write_map(run: SlamRun, path: Path) -> int:
+    """PLY (ASCII): x y z, id, sigma (largest deviation in any direction), number of measurements.
+
+    Returns the number of points; those without a place are left out. Identities are written as doubles where
+    PLY's 32 bits do not hold them.
+    """
+    map_ = run.map
+    sigma = sigma_of_points(map_.position_cov)
+    rows = np.flatnonzero(np.isfinite(map_.position).all(axis=1) & np.isfinite(sigma))
+    small = bool(np.all(np.abs(map_.id[rows]) < 2**31))
+    lines = [
+        "ply",
+        "format ascii 1.0",
+        "comment map of loc-slam, in world",
+        f"element vertex {len(rows)}",
+        *(f"property double {axis}" for axis in "xyz"),
+        f"property {'int' if small else 'double'} id",
+        "property double sigma",
+        "property int measured",
+        "end_header",
+    ]
+    for k in rows:
+        place = " ".join(repr(v) for v in map_.position[k].tolist())
+        lines.append(f"{place} {int(map_.id[k])} {float(sigma[k])!r} {int(map_.measured[k])}")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return len(rows)
+
+
+def write_trajectory(run: SlamRun, pose: str, path: Path) -> None:
+    """TUM; pose of body or of camera, in the world of the estimate."""
+    rows = known_rows(run)
+    if pose == "body":
+        trajectory = libloc.Trajectory(run.time_ns[rows], run.q_world_body_wxyz[rows], run.position[rows])
+    else:
+        trajectory = libloc.Trajectory(
+            run.time_ns[rows], run.q_world_camera_wxyz[rows], run.camera_position[rows]
+        )
+    libloc.write_tum(path, trajectory)
+
+
+def write(result: SlamResult, out: dict[str, Any], pose: str, pictures: bool, folder: Path) -> list[Path]:
+    """Writes everything into the folder; gives the paths."""
+    paths = [folder / "summary.json", folder / "summary.txt"]
+    paths[0].write_text(json.dumps(out, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    paths[1].write_text(text_of(out) + "\n", encoding="utf-8")
+    if len(result.run) == 0:
+        return paths
+    for name, function in (
+        ("trajectory.tum", lambda path: write_trajectory(result.run, pose, path)),
+        ("frames.csv", lambda path: write_frames(result.run, path)),
+        ("map.ply", lambda path: write_map(result.run, path)),
+    ):
+        function(folder / name)
+        paths.append(folder / name)
+    if pictures:
+        from libloc.programs import slam_plots
+
+        paths += slam_plots.write_pictures(result, folder)
+    return paths
