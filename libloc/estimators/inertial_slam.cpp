@@ -12,7 +12,12 @@ namespace {
 constexpr int kSetBackAfter = 20;           // samples in a row on an earlier time line
 constexpr std::size_t kMostWaiting = 256;   // frames without an IMU sample after them
 constexpr TimeNs kRestEvery = 100'000'000;  // between two uses of rest [ns]
-constexpr std::size_t kFewestStill = 5;     // features that tell whether the picture stands still
+constexpr int kTryEvery = 5;                // frames from one try of a start in motion to the next
+constexpr double kAnyHeading = 1.8;         // deviation of any angle in a turn [rad]
+constexpr double kRecoverAngle = 0.02;      // what is unknown after a contradiction [rad]
+constexpr double kRecoverPosition = 0.1;    // [m]
+constexpr double kRecoverVelocity = 0.5;    // [m/s]
+constexpr int kFewestStill = 5;             // features that tell whether the picture stands still
 
 double square(double x) {
   return x * x;
@@ -26,11 +31,28 @@ InertialStepNoise noise_of(const ImuNoise& noise, double dt_s) {
           .accelerometer_bias = square(noise.accelerometer_random_walk) * dt_s};
 }
 
+// On the line between two samples.
+ImuMeasurement between(const ImuMeasurement& a, const ImuMeasurement& b, TimeNs time_ns) {
+  const double part = to_seconds(time_ns - a.time_ns) / to_seconds(b.time_ns - a.time_ns);
+  ImuMeasurement out = b;
+  out.time_ns = time_ns;
+  out.angular_velocity = (1 - part) * a.angular_velocity + part * b.angular_velocity;
+  out.specific_force = (1 - part) * a.specific_force + part * b.specific_force;
+  return out;
+}
+
+SlamStartOptions moving_start_options(const SlamOptions& options) {
+  SlamStartOptions out = options.moving_start;
+  out.sigma_px = options.sigma_px;
+  return out;
+}
+
 }  // namespace
 
 InertialSlam::InertialSlam(const SlamOptions& options)
     : filter_(options),
       start_(options.start, options.stand_still, options.imu_noise, options.gravity),
+      moving_start_(moving_start_options(options), options.camera, options.imu_noise, options.gravity),
       rest_(options.stand_still, options.imu_noise, options.gravity) {
   require(options.motion == SlamMotion::kInertial, "motion: InertialSlam needs an IMU, MonoSlam does without");
 }
@@ -43,13 +65,14 @@ void InertialSlam::skip(const char* count, std::uint32_t status) {
 void InertialSlam::reset() {
   filter_.stop();
   start_.reset();
+  moving_start_.reset();
   rest_.reset();
   while (!waiting_.empty()) waiting_.pop_front();
   early_.clear();
   frame_count_ = 0;
   carried_.reset();
   picture_.clear();
-  still_frames_ = 0;
+  still_frames_ = early_frames_ = rejected_in_a_row_ = 0;
   last_ = Stamp{};
   last_good_frame_ns_ = last_frame_ns_ = rest_used_ns_ = kNoTime;
   restored_ = false;
@@ -87,6 +110,9 @@ void InertialSlam::process_frame(const FeaturesMeasurement& frame) {
   }
   last_frame_ns_ = frame.time_ns;
   waiting_.push_back(frame);
+  if (filter_.started()) return;
+  ++early_frames_;
+  moving_start_.push(frame);
 }
 
 bool InertialSlam::usable(const ImuMeasurement& imu) {
@@ -132,60 +158,131 @@ bool InertialSlam::process_imu(const ImuMeasurement& imu) {
     return true;
   }
   if (!filter_.started()) {
-    early_.push_back(imu);
-    if (!start_.push(imu)) return false;
-    return start();
+    last_imu_ = imu;
+    return look_for_start();
   }
   run(imu);
   return filter_.started();
 }
 
-bool InertialSlam::start() {
-  // A gyroscope at rest reads its bias, whatever that is, and an accelerometer that shakes reads gravity on the whole:
-  // whether it is rest, the picture tells, to about a pixel.
-  if (waiting_frames_stand_still()) {
-    const double pixel = options().still_picture_px / options().camera.intrinsics_px.head<2>().minCoeff();
-    begin(start_.estimate_still(pixel / options().start.duration_s));
-  } else {
-    begin(start_.estimate(false));
-  }
-  // All that came since then, in order.
-  std::vector<ImuMeasurement> samples;
-  samples.swap(early_);
-  for (const ImuMeasurement& imu : samples) {
-    if (imu.time_ns > filter_.time_ns()) {
-      run(imu);
-    } else if (imu.time_ns == filter_.time_ns()) {
-      last_imu_ = imu;
+// The last sample is in last_imu_.
+bool InertialSlam::look_for_start() {
+  early_.push_back(last_imu_);
+  moving_start_.push(last_imu_);
+  if (start_.push(last_imu_)) {
+    // A gyroscope at rest reads its bias, whatever that is, and an accelerometer that shakes reads gravity on the
+    // whole: whether it is rest, the picture tells, to about a pixel.
+    if (waiting_frames_stand_still(start_.samples().front().time_ns)) {
+      const double pixel = options().still_picture_px / options().camera.intrinsics_px.head<2>().minCoeff();
+      const FusionStartEstimate from = start_.estimate_still(pixel / options().start.duration_s);
+      begin(from.time_ns, from.state, from.covariance, "starts.at_rest");
+      replay_early();
+      return true;
     }
+    start_.reset();
   }
-  return filter_.started();
+  if (early_frames_ >= kTryEvery) {
+    early_frames_ = 0;
+    if (start_moving()) return true;
+  }
+  // What is too old for either start goes.
+  const double keep = std::max(options().moving_start.max_duration_s, options().start.duration_s) + 1;
+  const TimeNs oldest = last_imu_.time_ns - from_seconds(keep);
+  if (early_.front().time_ns < oldest - from_seconds(keep)) {
+    std::erase_if(early_, [&](const ImuMeasurement& imu) { return imu.time_ns < oldest; });
+  }
+  while (!waiting_.empty() && on_imu_clock(waiting_.front().time_ns) < oldest) {
+    waiting_.pop_front();
+    skip("features.skipped.before_start", 0);
+  }
+  return false;
 }
 
-void InertialSlam::begin(const FusionStartEstimate& from) {
+bool InertialSlam::start_moving() {
+  const auto found = moving_start_.solve();
+  if (!found) {
+    ++counts_[std::string("starts.refused.") + slam_start_outcome_name(moving_start_.outcome())];
+    return false;
+  }
+  // The filter uses the same measurements again: the solution tells where to linearise, and little more. The
+  // accelerometer's bias is its prior's, and comes from outside.
+  Eigen::Matrix<double, kInertialDim, 1> factor;
+  factor.setConstant(options().moving_start_factor);
+  factor.segment<3>(kAccelerometerBias).setOnes();
+  begin(found->time_ns, found->state, factor.asDiagonal() * found->covariance * factor.asDiagonal(), "starts.moving");
+  replay_early();
+  return true;
+}
+
+// All that came since the start, in order.
+void InertialSlam::replay_early() {
+  std::vector<ImuMeasurement> samples;
+  samples.swap(early_);
+  const TimeNs begin_ns = filter_.time_ns();
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (samples[i].time_ns <= begin_ns) {
+      // The state is at a frame, between two samples.
+      last_imu_ = samples[i];
+      if (i + 1 < samples.size() && samples[i + 1].time_ns > begin_ns)
+        last_imu_ = between(samples[i], samples[i + 1], begin_ns);
+      continue;
+    }
+    run(samples[i]);
+  }
+  start_.reset();
+  moving_start_.reset();
+}
+
+void InertialSlam::begin(TimeNs time_ns, const InertialState& from,
+                         const Eigen::Matrix<double, kInertialDim, kInertialDim>& from_covariance, const char* count) {
   const SlamOptions& o = options();
   const SlamLayout& layout = filter_.layout();
   SlamState state;
-  static_cast<InertialState&>(state) = from.state;
+  static_cast<InertialState&>(state) = from;
   state.position = o.position;
   state.T_body_camera = o.camera.T_body_camera;
   state.time_offset_s = o.camera.time_offset_s;
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(layout.dim, layout.dim);
-  covariance.topLeftCorner<kInertialDim, kInertialDim>() = from.covariance;
+  covariance.topLeftCorner<kInertialDim, kInertialDim>() = from_covariance;
   covariance.block<3, 3>(kPosition, kPosition) = square(o.sigma_position) * Eigen::Matrix3d::Identity();
   if (layout.extrinsic_rotation >= 0) {
     covariance.diagonal().segment<3>(layout.extrinsic_rotation).setConstant(square(o.sigma_extrinsic_rotation));
     covariance.diagonal().segment<3>(layout.extrinsic_position).setConstant(square(o.sigma_extrinsic_position));
   }
   if (layout.time_offset >= 0) covariance(layout.time_offset, layout.time_offset) = square(o.sigma_time_offset);
-  ++counts_[from.at_rest ? "starts.at_rest" : "starts.moving"];
-  filter_.start(from.time_ns, state, covariance);
-  last_good_frame_ns_ = from.time_ns;
+  if (carried_) carry_over(time_ns, state, covariance);
+  ++counts_[count];
+  filter_.start(time_ns, state, covariance);
+  last_good_frame_ns_ = time_ns;
+  carried_.reset();
   // Frames from before the start have no place in it.
-  while (!waiting_.empty() && on_imu_clock(waiting_.front().time_ns) < from.time_ns) {
+  while (!waiting_.empty() && on_imu_clock(waiting_.front().time_ns) < time_ns) {
     waiting_.pop_front();
     skip("features.skipped.before_start", 0);
   }
+}
+
+// Place and heading from before the gap, as well as they are known by then.
+void InertialSlam::carry_over(TimeNs time_ns, SlamState& state, Eigen::MatrixXd& covariance) const {
+  const SlamState& was = carried_->state;
+  const double gap = std::max(0.0, to_seconds(time_ns - carried_->time_ns));
+  const double turn = so3::heading(was.q_world_body) - so3::heading(state.q_world_body);
+  const Eigen::Quaterniond about_up(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()));
+  state.q_world_body = (about_up * state.q_world_body).normalized();
+  state.velocity = about_up * state.velocity;
+  state.position = was.position;
+  const Eigen::Matrix3d turned = about_up.toRotationMatrix();
+  covariance.middleRows<3>(kVelocity) = (turned * covariance.middleRows<3>(kVelocity)).eval();
+  covariance.middleCols<3>(kVelocity) = (covariance.middleCols<3>(kVelocity) * turned.transpose()).eval();
+
+  const Eigen::Vector3d up_then = was.q_world_body.conjugate() * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d up = state.q_world_body.conjugate() * Eigen::Vector3d::UnitZ();
+  const double heading = up_then.dot(carried_->covariance.block<3, 3>(kTheta, kTheta) * up_then) +
+                         square(std::min(options().gap_angular_velocity_sigma * gap, kAnyHeading));
+  covariance.block<3, 3>(kTheta, kTheta) += heading * up * up.transpose();
+  covariance.block<3, 3>(kPosition, kPosition) = carried_->covariance.block<3, 3>(kPosition, kPosition);
+  const double way = was.velocity.norm() * gap + 0.5 * options().gap_acceleration_sigma * gap * gap;
+  covariance.diagonal().segment<3>(kPosition).array() += square(way);
 }
 
 // To that time on the line between the last sample and this one.
@@ -193,11 +290,7 @@ void InertialSlam::step_to(TimeNs time_ns, const ImuMeasurement& to) {
   const TimeNs from_ns = filter_.time_ns();
   if (time_ns <= from_ns) return;
   const double dt = to_seconds(time_ns - from_ns);
-  const double part = dt / to_seconds(to.time_ns - from_ns);
-  ImuMeasurement end = to;
-  end.time_ns = time_ns;
-  end.angular_velocity = (1 - part) * last_imu_.angular_velocity + part * to.angular_velocity;
-  end.specific_force = (1 - part) * last_imu_.specific_force + part * to.specific_force;
+  const ImuMeasurement end = between(last_imu_, to, time_ns);
   const SlamState& state = filter_.state();
   const InertialStep step{0.5 * (last_imu_.angular_velocity + end.angular_velocity) - state.gyroscope_bias,
                           0.5 * (last_imu_.specific_force + end.specific_force) - state.accelerometer_bias, dt};
@@ -219,8 +312,10 @@ void InertialSlam::bridge(const ImuMeasurement& imu) {
 void InertialSlam::start_anew() {
   ++counts_["imu.gaps.restarted"];
   next_status_ |= kGap | kReinitialised;
+  carried_ = Carried{filter_.time_ns(), filter_.state(), filter_.head_covariance()};
   filter_.stop();
   start_.reset();
+  moving_start_.reset();
   rest_.reset();
   early_.clear();
   still_frames_ = 0;
@@ -230,8 +325,8 @@ void InertialSlam::run(const ImuMeasurement& imu) {
   const double dt = to_seconds(imu.time_ns - filter_.time_ns());
   if (dt > options().max_imu_bridge_s) {
     start_anew();
-    early_.push_back(imu);
-    start_.push(imu);
+    last_imu_ = imu;
+    look_for_start();
     return;
   }
   if (dt > options().max_imu_step_s) bridge(imu);
@@ -266,36 +361,51 @@ double InertialSlam::moved_px(const FeaturesMeasurement& frame) {
     if (other == picture_before_.end()) break;
     if (other->id == feature.id) moves_.push_back((other->pixel_px - feature.pixel_px).norm());
   }
-  if (moves_.size() < kFewestStill) return kUnknown;
+  if (moves_.size() < static_cast<std::size_t>(kFewestStill)) return kUnknown;
   const auto middle = moves_.begin() + static_cast<std::ptrdiff_t>(moves_.size() / 2);
   std::nth_element(moves_.begin(), middle, moves_.end());
   return *middle;
 }
 
-// Over the time of the start.
-bool InertialSlam::waiting_frames_stand_still() {
-  bool still = waiting_.size() >= 3;
-  for (std::size_t i = 0; i < waiting_.size() && still; ++i) {
-    const double moved = moved_px(waiting_[i]);
-    still = i == 0 || moved < options().still_picture_px;
+// Of the frames since then.
+bool InertialSlam::waiting_frames_stand_still(TimeNs since_ns) {
+  std::size_t first = 0;
+  while (first < waiting_.size() && on_imu_clock(waiting_[first].time_ns) < since_ns) ++first;
+  if (waiting_.size() < first + 3) return false;
+  moved_px(waiting_[first]);
+  for (std::size_t i = first + 1; i < waiting_.size(); ++i) {
+    if (!(moved_px(waiting_[i]) < options().still_picture_px)) return false;
   }
-  if (!still) return false;
   // What creeps from frame to frame shows over all of them.
-  moved_px(waiting_.front());
+  moved_px(waiting_[first]);
   return moved_px(waiting_.back()) < 2 * options().still_picture_px;
 }
 
 void InertialSlam::take_frame(const FeaturesMeasurement& frame) {
   still_frames_ = moved_px(frame) < options().still_picture_px ? still_frames_ + 1 : 0;
 
-  const SlamFrame& done = filter_.update(frame);
+  const SlamFrame& done = filter_.update(frame, status_);
   ++frames_used_;
   if ((done.estimate.status & kFewFeatures) == 0 && done.counts.in_frame > 0) last_good_frame_ns_ = filter_.time_ns();
+  recover(done);
   if (frame_count_ == frames_.size()) frames_.emplace_back();
   SlamFrame& out = frames_[frame_count_++];
   out = done;
-  out.estimate.host_time_ns = frame.host_time_ns;
-  out.estimate.sequence = frame.sequence;
+}
+
+// Most of what is seen contradicts the state for some frames: the state is wrong, and does not know it.
+void InertialSlam::recover(const SlamFrame& frame) {
+  const bool contradicted = frame.counts.rejected >= kFewestStill && frame.counts.rejected > frame.counts.measured;
+  rejected_in_a_row_ = contradicted ? rejected_in_a_row_ + 1 : 0;
+  if (rejected_in_a_row_ < options().recover_after) return;
+  rejected_in_a_row_ = 0;
+  Eigen::VectorXd variance = Eigen::VectorXd::Zero(filter_.layout().dim);
+  variance.segment<3>(kTheta).setConstant(square(kRecoverAngle));
+  variance.segment<3>(kPosition).setConstant(square(kRecoverPosition));
+  variance.segment<3>(kVelocity).setConstant(square(kRecoverVelocity));
+  filter_.widen(variance);
+  ++counts_["recovered"];
+  next_status_ |= kRecovered;
 }
 
 void InertialSlam::look_for_rest(const ImuMeasurement& imu) {

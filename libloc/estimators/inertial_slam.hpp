@@ -23,6 +23,7 @@
 #include "libloc/estimators/fusion_start.hpp"
 #include "libloc/estimators/slam_filter.hpp"
 #include "libloc/estimators/slam_options.hpp"
+#include "libloc/estimators/slam_start.hpp"
 #include "libloc/estimators/stand_still.hpp"
 
 namespace loc {
@@ -62,15 +63,20 @@ class InertialSlam {
   bool process_imu(const ImuMeasurement& imu);
   void process_frame(const FeaturesMeasurement& frame);
   bool usable(const ImuMeasurement& imu);
-  bool start();
-  void begin(const FusionStartEstimate& from);
+  bool look_for_start();
+  bool start_moving();
+  void begin(TimeNs time_ns, const InertialState& from,
+             const Eigen::Matrix<double, kInertialDim, kInertialDim>& from_covariance, const char* count);
+  void carry_over(TimeNs time_ns, SlamState& state, Eigen::MatrixXd& covariance) const;
+  void replay_early();
+  void recover(const SlamFrame& frame);
   void run(const ImuMeasurement& imu);
   void step_to(TimeNs time_ns, const ImuMeasurement& to);
   void bridge(const ImuMeasurement& imu);
   void start_anew();
   void take_frame(const FeaturesMeasurement& frame);
   double moved_px(const FeaturesMeasurement& frame);
-  bool waiting_frames_stand_still();
+  bool waiting_frames_stand_still(TimeNs since_ns);
   void look_for_rest(const ImuMeasurement& imu);
   bool picture_stands_still() const { return still_frames_ >= 2; }
   TimeNs on_imu_clock(TimeNs camera_time_ns) const;
@@ -78,12 +84,14 @@ class InertialSlam {
 
   SlamFilter filter_;
   FusionStart start_;
+  SlamStart moving_start_;
   StandStillDetector rest_;
   std::vector<SlamFrame> frames_;
   std::size_t frame_count_ = 0;
 
   Fifo<FeaturesMeasurement> waiting_;  // frames, for the IMU
   std::vector<ImuMeasurement> early_;  // samples, for the start
+  int early_frames_ = 0;               // since a start was last tried
   ImuMeasurement last_imu_;            // as the filter's state is; its rate and force at the filter's time
   Stamp last_;
   std::optional<Carried> carried_;
@@ -91,6 +99,7 @@ class InertialSlam {
   std::vector<FeatureObservation> picture_before_;
   std::vector<double> moves_;
   int still_frames_ = 0;
+  int rejected_in_a_row_ = 0;
   TimeNs last_good_frame_ns_ = kNoTime;
   TimeNs last_frame_ns_ = kNoTime;
   TimeNs rest_used_ns_ = kNoTime;

@@ -74,11 +74,7 @@ bool MonoSlam::process_frame(const FeaturesMeasurement& frame) {
   }
   restored_ = false;
   set_back_in_a_row_ = 0;
-  estimate_ = filter_.update(frame).estimate;
-  estimate_.time_ns = frame.time_ns;
-  estimate_.host_time_ns = frame.host_time_ns;
-  estimate_.sequence = frame.sequence;
-  estimate_.status |= next_status_;
+  estimate_ = filter_.update(frame, next_status_).estimate;
   next_status_ = 0;
   ++used_;
   return true;

@@ -70,7 +70,10 @@ void SlamFilter::start(TimeNs time_ns, const SlamState& state, const Eigen::Matr
 
 void SlamFilter::start(TimeNs time_ns) {
   SlamState state;
-  state.q_world_body = options_.q_world_body.normalized();
+  // Camera: z along x of world, y down.
+  const Eigen::Quaterniond looking(0.5, -0.5, 0.5, -0.5);
+  state.q_world_body = options_.q_world_body ? options_.q_world_body->normalized()
+                                             : looking * options_.camera.T_body_camera.rotation.conjugate();
   state.position = options_.position;
   state.velocity = options_.velocity;
   state.angular_velocity = options_.angular_velocity;
@@ -458,7 +461,7 @@ void SlamFilter::report(const FeaturesMeasurement& frame) {
   }
 }
 
-const SlamFrame& SlamFilter::update(const FeaturesMeasurement& frame) {
+const SlamFrame& SlamFilter::update(const FeaturesMeasurement& frame, std::uint32_t status) {
   const auto begin = std::chrono::steady_clock::now();
   static_cast<Stamp&>(frame_) = frame;
   frame_.camera = frame.camera;
@@ -495,6 +498,9 @@ const SlamFrame& SlamFilter::update(const FeaturesMeasurement& frame) {
   ++frames_;
 
   frame_.estimate = estimate();
+  frame_.estimate.host_time_ns = frame.host_time_ns;
+  frame_.estimate.sequence = frame.sequence;
+  frame_.estimate.status |= status;
   if (expected > 0 && counts.measured < kFewest) frame_.estimate.status |= kFewFeatures;
   if (counts.rejected > counts.measured) frame_.estimate.status |= kFeaturesRejected;
   frame_.time_spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -85,8 +85,8 @@ class SlamFilter {
   /// Head's variances grow: what happened meanwhile is not known. @param variance of each error of the head
   void widen(const Eigen::VectorXd& variance);
 
-  /// A frame at time_ns(). The result holds until the next call.
-  const SlamFrame& update(const FeaturesMeasurement& frame);
+  /// A frame at time_ns(). The result holds until the next call. @param status EstimateStatus to be said with it
+  const SlamFrame& update(const FeaturesMeasurement& frame, std::uint32_t status = 0);
 
   /// The body does not move: v = 0, and with an IMU the mean rate is the gyroscope's bias.
   /// @param rate as measured, bias not removed [rad/s] @returns false when the filter knows better (gate).

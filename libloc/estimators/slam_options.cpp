@@ -64,7 +64,8 @@ void SlamOptions::check() const {
   require(camera_index >= 0, "camera_index", camera_index, "must not be negative");
   require(position.allFinite() && velocity.allFinite() && angular_velocity.allFinite(),
           "position, velocity and angular_velocity must be finite");
-  require(q_world_body.coeffs().allFinite() && q_world_body.norm() > 1e-6, "q_world_body must be finite, and not zero");
+  require(!q_world_body || (q_world_body->coeffs().allFinite() && q_world_body->norm() > 1e-6),
+          "q_world_body must be finite, and not zero");
   require_not_negative("sigma_position", sigma_position);
   require_not_negative("sigma_orientation", sigma_orientation);
   require_not_negative("sigma_velocity", sigma_velocity);
@@ -79,6 +80,10 @@ void SlamOptions::check() const {
   require_positive("sigma_time_offset", sigma_time_offset);
   require_positive("max_gap_s", max_gap_s);
   start.check();
+  moving_start.check();
+  require(moving_start_factor >= 1 && moving_start_factor <= 100, "moving_start_factor", moving_start_factor,
+          "must be from 1 to 100");
+  require_at_least("recover_after", recover_after, 1);
   stand_still.check();
   require_positive("zero_velocity_sigma", zero_velocity_sigma);
   require_positive("zero_rate_sigma_floor", zero_rate_sigma_floor);

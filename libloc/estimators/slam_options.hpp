@@ -6,12 +6,14 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "libloc/core/time.hpp"
 #include "libloc/estimators/fusion_start.hpp"
+#include "libloc/estimators/slam_start.hpp"
 #include "libloc/estimators/stand_still.hpp"
 #include "libloc/sensors/imu_noise.hpp"
 #include "libloc/sensors/rig.hpp"
@@ -59,7 +61,7 @@ struct SlamMapOptions {
   double sigma_inverse_depth = 0.3;   ///< its deviation (sigma_rho); 0 must lie well within 2 sigma [1/m]
   bool depth_from_neighbours = true;  ///< rho_0 of a new feature is the median of those that are known; its deviation
                                       ///< grows with it
-  double max_linearity_index = 0.1;   ///< below it a feature becomes XYZ (inverse_depth.hpp); 0: never
+  double max_linearity_index = 0.07;  ///< below it a feature becomes XYZ (inverse_depth.hpp); 0: never
   int delete_after_tries = 10;        ///< frames in which it was expected, before it is judged
   double delete_below_ratio = 0.5;    ///< measured in less than this share of them: deleted
 
@@ -92,8 +94,8 @@ struct SlamOptions {
   // Start. Camera alone: as it is given. With an IMU only position and heading are; tilt, velocity and biases are
   // found.
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of body in world (X_cam) [m]
-  /// (X_cam_rotation). The default lets a camera with T_body_camera = I look along x of a world with z up.
-  Eigen::Quaterniond q_world_body{0.5, -0.5, 0.5, -0.5};
+  /// Of body in world (X_cam_rotation). None: the camera looks along x of a world with z up.
+  std::optional<Eigen::Quaterniond> q_world_body;
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< in world (X_cam_velocity) [m/s]
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< in body (X_cam_angular_velocity) [rad/s]
   double sigma_position = 0;                                   ///< [m]; 0: world is where the camera began
@@ -104,8 +106,13 @@ struct SlamOptions {
   // Q: continuous densities.
   double acceleration_density = 1;          ///< camera alone [m/s^2/sqrt(Hz)]
   double angular_acceleration_density = 1;  ///< camera alone [rad/s^2/sqrt(Hz)]
-  ImuNoise imu_noise;                       ///< with an IMU; biases begin with its deviations
-  double gravity = 9.80665;                 ///< [m/s^2]
+  /// With an IMU; biases begin with its deviations. What is carried or flies shakes: twice the white noise of a
+  /// sensor at rest.
+  ImuNoise imu_noise{.gyroscope_noise_density = 1.7e-4,
+                     .gyroscope_random_walk = 2e-5,
+                     .accelerometer_noise_density = 4e-3,
+                     .accelerometer_random_walk = 1e-3};
+  double gravity = 9.80665;  ///< [m/s^2]
 
   // R.
   double sigma_px = 1;          ///< deviation of one coordinate, of frames that do not say
@@ -124,7 +131,10 @@ struct SlamOptions {
   double max_gap_s = 1;  ///< camera alone: after a longer pause between frames the motion is unknown [s]
 
   // With an IMU.
-  FusionStartOptions start;                 ///< from rest
+  FusionStartOptions start;       ///< from rest
+  SlamStartOptions moving_start;  ///< from motion; its sigma_px is not used, that of these options is
+  /// By which the deviations of a start from motion are multiplied: what it rests on is used again by the filter.
+  double moving_start_factor = 3;
   StandStillOptions stand_still;            ///< when the body rests
   bool zero_velocity = true;                ///< the velocity is zero while IMU and picture stand still
   double zero_velocity_sigma = 0.02;        ///< [m/s]
@@ -136,7 +146,9 @@ struct SlamOptions {
   double gap_angular_velocity_sigma = 0.5;  ///< the same [rad/s]
   double max_angular_velocity = 70;         ///< A sample with more is an error of the sensor: skipped. [rad/s]
   double max_specific_force = 500;          ///< The same. [m/s^2]
-  double lost_after_s = 0.5;                ///< without a frame of enough features: estimates say so (kFewFeatures) [s]
+  int recover_after =
+      5;  ///< frames in a row of which most is not believed: the motion is taken for unknown (kRecovered)
+  double lost_after_s = 0.5;  ///< without a frame of enough features: estimates say so (kFewFeatures) [s]
 
   /// @throws std::invalid_argument naming the field and its value.
   void check() const;

@@ -120,9 +120,15 @@ void bind_slam_options_struct(py::module_& m) {
       .def_readwrite("camera_index", &O::camera_index, "Which frames are ours.");
   vector_property(c, "position", &O::position, "Start: of body in world (3,) (X_cam) [m].");
   c.def_property(
-      "q_world_body_wxyz", [](const O& o) { return to_wxyz(o.q_world_body); },
-      [](O& o, const ArrayLike& q) { o.q_world_body = quaternion(q, "q_world_body_wxyz"); },
-      "Start (4,) (X_cam_rotation). Default: a camera with T_body_camera = I looks along x of a world with z up.");
+      "q_world_body_wxyz", [](const O& o) -> py::object {
+        if (!o.q_world_body) return py::none();
+        return to_wxyz(*o.q_world_body);
+      },
+      [](O& o, const std::optional<ArrayLike>& q) {
+        o.q_world_body.reset();
+        if (q) o.q_world_body = quaternion(*q, "q_world_body_wxyz");
+      },
+      "Start (4,) (X_cam_rotation). None, the default: the camera looks along x of a world with z up.");
   vector_property(c, "velocity", &O::velocity, "Start: in world (3,) (X_cam_velocity) [m/s].");
   vector_property(c, "angular_velocity", &O::angular_velocity, "Start: in body (3,) (X_cam_angular_velocity) [rad/s].");
   c.def_readwrite("sigma_position", &O::sigma_position, "Of the start [m]; 0: world is where the camera began.")

@@ -16,8 +16,6 @@ from libloc.programs.evaluate_input import Poses, normalised, read_reference
 
 # The methods as loc-estimator calls them.
 METHODS = {"mono-slam": SlamMotion.CONSTANT_VELOCITY}
-# Of a camera that looks along x of a world with z up.
-_Q_WORLD_CAMERA = (0.5, -0.5, 0.5, -0.5)
 
 
 @dataclass
@@ -148,9 +146,6 @@ def slam_options(options: argparse.Namespace, rig: libloc.Rig) -> SlamOptions:
     out.camera_index = options.camera
     if rig.imu is not None:
         out.imu_noise = rig.imu.noise
-    if out.motion == SlamMotion.CONSTANT_VELOCITY:
-        start = libloc.Pose3(_Q_WORLD_CAMERA) * out.camera.T_body_camera.inverse()
-        out.q_world_body_wxyz = start.rotation_wxyz
     if options.sigma_px is not None:
         out.sigma_px = options.sigma_px
         out.override_sigma = True
