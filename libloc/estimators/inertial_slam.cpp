@@ -13,6 +13,7 @@ constexpr int kSetBackAfter = 20;           // samples in a row on an earlier ti
 constexpr std::size_t kMostWaiting = 256;   // frames without an IMU sample after them
 constexpr TimeNs kRestEvery = 100'000'000;  // between two uses of rest [ns]
 constexpr int kTryEvery = 5;                // frames from one try of a start in motion to the next
+constexpr double kVibrationTime = 0.1;      // over which shaking is averaged [s]
 constexpr double kAnyHeading = 1.8;         // deviation of any angle in a turn [rad]
 constexpr double kRecoverAngle = 0.02;      // what is unknown after a contradiction [rad]
 constexpr double kRecoverPosition = 0.1;    // [m]
@@ -21,14 +22,6 @@ constexpr int kFewestStill = 5;             // features that tell whether the pi
 
 double square(double x) {
   return x * x;
-}
-
-InertialStepNoise noise_of(const ImuNoise& noise, double dt_s) {
-  return {.theta = square(noise.gyroscope_noise_density) * dt_s,
-          .velocity = square(noise.accelerometer_noise_density) * dt_s,
-          .position = 0,
-          .gyroscope_bias = square(noise.gyroscope_random_walk) * dt_s,
-          .accelerometer_bias = square(noise.accelerometer_random_walk) * dt_s};
 }
 
 // On the line between two samples.
@@ -285,6 +278,33 @@ void InertialSlam::carry_over(TimeNs time_ns, SlamState& state, Eigen::MatrixXd&
   covariance.diagonal().segment<3>(kPosition).array() += square(way);
 }
 
+// Of a step, from the densities, and from how much the readings shake: what happens between two samples is not seen,
+// and a part of the shaking counts as white. Half of the mean square of a difference is the variance of a reading.
+InertialStepNoise InertialSlam::noise_of(double dt_s) const {
+  const ImuNoise& noise = options().imu_noise;
+  const double part = options().vibration_part;
+  const double rate = square(noise.gyroscope_noise_density) + part * vibration_.rate * dt_s;
+  const double force = square(noise.accelerometer_noise_density) + part * vibration_.force * dt_s;
+  return {.theta = rate * dt_s,
+          .velocity = force * dt_s,
+          .position = 0,
+          .gyroscope_bias = square(noise.gyroscope_random_walk) * dt_s,
+          .accelerometer_bias = square(noise.accelerometer_random_walk) * dt_s};
+}
+
+void InertialSlam::see_vibration(const ImuMeasurement& imu) {
+  const double dt = to_seconds(imu.time_ns - vibration_.last.time_ns);
+  if (vibration_.last.time_ns != kNoTime && dt > 0 && dt < options().max_imu_step_s) {
+    const double part = std::min(1.0, dt / kVibrationTime);
+    const auto see = [&](double& mean, const Eigen::Vector3d& now, const Eigen::Vector3d& then) {
+      mean += part * ((now - then).squaredNorm() / 6 - mean);
+    };
+    see(vibration_.rate, imu.angular_velocity, vibration_.last.angular_velocity);
+    see(vibration_.force, imu.specific_force, vibration_.last.specific_force);
+  }
+  vibration_.last = imu;
+}
+
 // To that time on the line between the last sample and this one.
 void InertialSlam::step_to(TimeNs time_ns, const ImuMeasurement& to) {
   const TimeNs from_ns = filter_.time_ns();
@@ -294,7 +314,7 @@ void InertialSlam::step_to(TimeNs time_ns, const ImuMeasurement& to) {
   const SlamState& state = filter_.state();
   const InertialStep step{0.5 * (last_imu_.angular_velocity + end.angular_velocity) - state.gyroscope_bias,
                           0.5 * (last_imu_.specific_force + end.specific_force) - state.accelerometer_bias, dt};
-  filter_.propagate(time_ns, step, noise_of(options().imu_noise, dt));
+  filter_.propagate(time_ns, step, noise_of(dt));
   last_imu_ = end;
 }
 
@@ -322,6 +342,7 @@ void InertialSlam::start_anew() {
 }
 
 void InertialSlam::run(const ImuMeasurement& imu) {
+  see_vibration(imu);
   const double dt = to_seconds(imu.time_ns - filter_.time_ns());
   if (dt > options().max_imu_bridge_s) {
     start_anew();

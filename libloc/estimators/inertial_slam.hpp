@@ -54,6 +54,12 @@ class InertialSlam {
   void restore(const SlamSnapshot& snapshot);
 
  private:
+  // Variances of one component of a reading, by the differences from sample to sample.
+  struct Vibration {
+    ImuMeasurement last;
+    double rate = 0;
+    double force = 0;
+  };
   struct Carried {
     TimeNs time_ns = kNoTime;
     SlamState state;
@@ -74,6 +80,8 @@ class InertialSlam {
   void step_to(TimeNs time_ns, const ImuMeasurement& to);
   void bridge(const ImuMeasurement& imu);
   void start_anew();
+  InertialStepNoise noise_of(double dt_s) const;
+  void see_vibration(const ImuMeasurement& imu);
   void take_frame(const FeaturesMeasurement& frame);
   double moved_px(const FeaturesMeasurement& frame);
   bool waiting_frames_stand_still(TimeNs since_ns);
@@ -95,6 +103,7 @@ class InertialSlam {
   ImuMeasurement last_imu_;            // as the filter's state is; its rate and force at the filter's time
   Stamp last_;
   std::optional<Carried> carried_;
+  Vibration vibration_;
   std::vector<FeatureObservation> picture_;  // of the last frame, by identity: does it stand still?
   std::vector<FeatureObservation> picture_before_;
   std::vector<double> moves_;

@@ -73,6 +73,7 @@ void SlamOptions::check() const {
   require_not_negative("acceleration_density", acceleration_density);
   require_not_negative("angular_acceleration_density", angular_acceleration_density);
   imu_noise.check();
+  require(vibration_part >= 0 && vibration_part <= 1, "vibration_part", vibration_part, "must be from 0 to 1");
   require_positive("gravity", gravity);
   require_positive("sigma_px", sigma_px);
   require_positive("sigma_extrinsic_rotation", sigma_extrinsic_rotation);

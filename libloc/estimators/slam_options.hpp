@@ -106,12 +106,10 @@ struct SlamOptions {
   // Q: continuous densities.
   double acceleration_density = 1;          ///< camera alone [m/s^2/sqrt(Hz)]
   double angular_acceleration_density = 1;  ///< camera alone [rad/s^2/sqrt(Hz)]
-  /// With an IMU; biases begin with its deviations. What is carried or flies shakes: twice the white noise of a
-  /// sensor at rest.
-  ImuNoise imu_noise{.gyroscope_noise_density = 1.7e-4,
-                     .gyroscope_random_walk = 2e-5,
-                     .accelerometer_noise_density = 4e-3,
-                     .accelerometer_random_walk = 1e-3};
+                                            /// With an IMU; biases begin with its deviations.
+  ImuNoise imu_noise{.accelerometer_random_walk = 1e-3};
+  /// So much of the variance by which readings differ from sample to sample counts as white noise of the IMU.
+  double vibration_part = 0.01;
   double gravity = 9.80665;  ///< [m/s^2]
 
   // R.
@@ -147,7 +145,7 @@ struct SlamOptions {
   double max_angular_velocity = 70;         ///< A sample with more is an error of the sensor: skipped. [rad/s]
   double max_specific_force = 500;          ///< The same. [m/s^2]
   int recover_after =
-      5;  ///< frames in a row of which most is not believed: the motion is taken for unknown (kRecovered)
+      10;  ///< frames in a row of which most is not believed: the motion is taken for unknown (kRecovered)
   double lost_after_s = 0.5;  ///< without a frame of enough features: estimates say so (kFewFeatures) [s]
 
   /// @throws std::invalid_argument naming the field and its value.
