@@ -106,14 +106,15 @@ struct SlamOptions {
   // Q: continuous densities.
   double acceleration_density = 1;          ///< camera alone [m/s^2/sqrt(Hz)]
   double angular_acceleration_density = 1;  ///< camera alone [rad/s^2/sqrt(Hz)]
-                                            /// With an IMU; biases begin with its deviations.
+
+  /// With an IMU; biases begin with its deviations.
   ImuNoise imu_noise{.accelerometer_random_walk = 1e-3};
   /// So much of the variance by which readings differ from sample to sample counts as white noise of the IMU.
   double vibration_part = 0.01;
   double gravity = 9.80665;  ///< [m/s^2]
 
   // R.
-  double sigma_px = 1;          ///< deviation of one coordinate, of frames that do not say
+  double sigma_px = 1.5;        ///< deviation of one coordinate, of frames that do not say
   bool override_sigma = false;  ///< sigma_px also in place of what frames say
 
   bool estimate_extrinsics = false;        ///< T_body_camera is part of the state
@@ -144,8 +145,8 @@ struct SlamOptions {
   double gap_angular_velocity_sigma = 0.5;  ///< the same [rad/s]
   double max_angular_velocity = 70;         ///< A sample with more is an error of the sensor: skipped. [rad/s]
   double max_specific_force = 500;          ///< The same. [m/s^2]
-  int recover_after =
-      10;  ///< frames in a row of which most is not believed: the motion is taken for unknown (kRecovered)
+  /// So many frames in a row of which most is not believed: the motion is taken for unknown (kRecovered).
+  int recover_after = 10;
   double lost_after_s = 0.5;  ///< without a frame of enough features: estimates say so (kFewFeatures) [s]
 
   /// @throws std::invalid_argument naming the field and its value.
