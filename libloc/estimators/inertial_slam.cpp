@@ -37,6 +37,7 @@ ImuMeasurement between(const ImuMeasurement& a, const ImuMeasurement& b, TimeNs 
 SlamStartOptions moving_start_options(const SlamOptions& options) {
   SlamStartOptions out = options.moving_start;
   out.sigma_px = options.sigma_px;
+  out.sampling = options.imu_sampling;
   return out;
 }
 
@@ -152,9 +153,12 @@ bool InertialSlam::process_imu(const ImuMeasurement& imu) {
   }
   if (!filter_.started()) {
     last_imu_ = imu;
-    return look_for_start();
+    const bool found = look_for_start();
+    if (!found) next_status_ |= status_;
+    return found;
   }
   run(imu);
+  if (!filter_.started()) next_status_ |= status_;  // for the first estimate after it
   return filter_.started();
 }
 
@@ -310,10 +314,17 @@ void InertialSlam::step_to(TimeNs time_ns, const ImuMeasurement& to) {
   const TimeNs from_ns = filter_.time_ns();
   if (time_ns <= from_ns) return;
   const double dt = to_seconds(time_ns - from_ns);
-  const ImuMeasurement end = between(last_imu_, to, time_ns);
   const SlamState& state = filter_.state();
-  const InertialStep step{0.5 * (last_imu_.angular_velocity + end.angular_velocity) - state.gyroscope_bias,
-                          0.5 * (last_imu_.specific_force + end.specific_force) - state.accelerometer_bias, dt};
+  ImuMeasurement end = to;
+  InertialStep step{to.angular_velocity, to.specific_force, dt};
+  if (options().imu_sampling == ImuSampling::kPoint) {
+    end = between(last_imu_, to, time_ns);
+    step.angular_velocity = 0.5 * (last_imu_.angular_velocity + end.angular_velocity);
+    step.specific_force = 0.5 * (last_imu_.specific_force + end.specific_force);
+  }
+  end.time_ns = time_ns;
+  step.angular_velocity -= state.gyroscope_bias;
+  step.specific_force -= state.accelerometer_bias;
   filter_.propagate(time_ns, step, noise_of(dt));
   last_imu_ = end;
 }
@@ -369,23 +380,35 @@ void InertialSlam::run(const ImuMeasurement& imu) {
   if (to_seconds(imu.time_ns - last_good_frame_ns_) > options().lost_after_s) status_ |= kFewFeatures;
 }
 
-// Median of how far features moved since the frame before; NaN when too few are in both.
+// How far the picture moved since the frame before: the largest of the medians along u and v, away from its centre and
+// around it, so that the noise of single features does not count. NaN when too few are in both.
 double InertialSlam::moved_px(const FeaturesMeasurement& frame) {
   picture_.swap(picture_before_);
   picture_.assign(frame.features.begin(), frame.features.end());
   std::sort(picture_.begin(), picture_.end(),
             [](const FeatureObservation& a, const FeatureObservation& b) { return a.id < b.id; });
-  moves_.clear();
+  for (std::vector<double>& moves : moves_) moves.clear();
+  const Eigen::Vector2d centre = options().camera.intrinsics_px.tail<2>();
   auto other = picture_before_.begin();
   for (const FeatureObservation& feature : picture_) {
     while (other != picture_before_.end() && other->id < feature.id) ++other;
     if (other == picture_before_.end()) break;
-    if (other->id == feature.id) moves_.push_back((other->pixel_px - feature.pixel_px).norm());
+    if (other->id != feature.id) continue;
+    const Eigen::Vector2d move = feature.pixel_px - other->pixel_px;
+    const Eigen::Vector2d out = (other->pixel_px - centre).normalized();
+    moves_[0].push_back(move.x());
+    moves_[1].push_back(move.y());
+    moves_[2].push_back(out.dot(move));
+    moves_[3].push_back(out.x() * move.y() - out.y() * move.x());
   }
-  if (moves_.size() < static_cast<std::size_t>(kFewestStill)) return kUnknown;
-  const auto middle = moves_.begin() + static_cast<std::ptrdiff_t>(moves_.size() / 2);
-  std::nth_element(moves_.begin(), middle, moves_.end());
-  return *middle;
+  if (moves_[0].size() < static_cast<std::size_t>(kFewestStill)) return kUnknown;
+  double most = 0;
+  for (std::vector<double>& moves : moves_) {
+    const auto middle = moves.begin() + static_cast<std::ptrdiff_t>(moves.size() / 2);
+    std::nth_element(moves.begin(), middle, moves.end());
+    most = std::max(most, std::abs(*middle));
+  }
+  return most;
 }
 
 // Of the frames since then.

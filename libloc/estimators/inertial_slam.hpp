@@ -13,6 +13,7 @@
 // Not observable: place and heading of the world. Without acceleration: the scale.
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -106,7 +107,7 @@ class InertialSlam {
   Vibration vibration_;
   std::vector<FeatureObservation> picture_;  // of the last frame, by identity: does it stand still?
   std::vector<FeatureObservation> picture_before_;
-  std::vector<double> moves_;
+  std::array<std::vector<double>, 4> moves_;
   int still_frames_ = 0;
   int rejected_in_a_row_ = 0;
   TimeNs last_good_frame_ns_ = kNoTime;

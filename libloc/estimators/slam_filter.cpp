@@ -393,6 +393,7 @@ void SlamFilter::rescue(const FeaturesMeasurement& frame) {
     }
   }
   if (accepted_.empty()) return;
+  iterate(frame);
   if (!covariance_.update(accepted_, accepted_residual_, dx_, nis_)) {
     ++failed_updates_;
     return;

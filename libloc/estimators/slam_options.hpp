@@ -15,6 +15,7 @@
 #include "libloc/estimators/fusion_start.hpp"
 #include "libloc/estimators/slam_start.hpp"
 #include "libloc/estimators/stand_still.hpp"
+#include "libloc/filter/imu_propagation.hpp"
 #include "libloc/sensors/imu_noise.hpp"
 #include "libloc/sensors/rig.hpp"
 
@@ -85,7 +86,7 @@ struct SlamOptions {
   SlamMotion motion = SlamMotion::kConstantVelocity;
   SlamConsistency consistency = SlamConsistency::kInvariant;
   SlamPrecision precision = SlamPrecision::kDouble;
-  int max_iterations = 3;  ///< of an update that is far from linear; 1: plain EKF
+  int max_iterations = 5;  ///< of an update that is far from linear; 1: plain EKF
   /// K with distortion, the pose in body and the clock. Without an IMU body is what moves smoothly; T_body_camera may
   /// be the identity.
   CameraCalibration camera;
@@ -109,6 +110,7 @@ struct SlamOptions {
 
   /// With an IMU; biases begin with its deviations.
   ImuNoise imu_noise{.accelerometer_random_walk = 1e-3};
+  ImuSampling imu_sampling = ImuSampling::kIntervalMean;  ///< what a sample of the IMU says
   /// So much of the variance by which readings differ from sample to sample counts as white noise of the IMU.
   double vibration_part = 0.01;
   double gravity = 9.80665;  ///< [m/s^2]
@@ -131,17 +133,17 @@ struct SlamOptions {
 
   // With an IMU.
   FusionStartOptions start;       ///< from rest
-  SlamStartOptions moving_start;  ///< from motion; its sigma_px is not used, that of these options is
+  SlamStartOptions moving_start;  ///< from motion; its sigma_px and sampling are those of these options
   /// By which the deviations of a start from motion are multiplied: what it rests on is used again by the filter.
   double moving_start_factor = 3;
-  StandStillOptions stand_still;            ///< when the body rests
-  bool zero_velocity = true;                ///< the velocity is zero while IMU and picture stand still
-  double zero_velocity_sigma = 0.02;        ///< [m/s]
-  double zero_rate_sigma_floor = 1e-4;      ///< what a body at rest may turn, earth rate included [rad/s]
-  double still_picture_px = 1.5;            ///< features move less from frame to frame: the picture stands still [px]
-  double max_imu_step_s = 0.1;              ///< a longer step is a gap: bridged with more noise … [s]
-  double max_imu_bridge_s = 1;              ///< … up to here; beyond it a new start [s]
-  double gap_acceleration_sigma = 3;        ///< what the body may do in a gap [m/s^2]
+  StandStillOptions stand_still;        ///< when the body rests
+  bool zero_velocity = true;            ///< the velocity is zero while IMU and picture stand still
+  double zero_velocity_sigma = 0.02;    ///< [m/s]
+  double zero_rate_sigma_floor = 1e-4;  ///< what a body at rest may turn, earth rate included [rad/s]
+  double still_picture_px = 1;          ///< the picture moves less as a whole from frame to frame: it stands still [px]
+  double max_imu_step_s = 0.1;          ///< a longer step is a gap: bridged with more noise … [s]
+  double max_imu_bridge_s = 1;          ///< … up to here; beyond it a new start [s]
+  double gap_acceleration_sigma = 3;    ///< what the body may do in a gap [m/s^2]
   double gap_angular_velocity_sigma = 0.5;  ///< the same [rad/s]
   double max_angular_velocity = 70;         ///< A sample with more is an error of the sensor: skipped. [rad/s]
   double max_specific_force = 500;          ///< The same. [m/s^2]

@@ -72,6 +72,7 @@ const std::vector<char>& OnePointRansac::run(const MapCovariance& covariance, co
   const auto needed_for = [&](const std::vector<char>& agrees) {
     const auto right = static_cast<double>(std::count(agrees.begin(), agrees.end(), 1)) / static_cast<double>(count);
     if (right >= 1) return 0.0;
+    if (right <= 0) return static_cast<double>(options_.max_hypotheses);
     return std::min<double>(options_.max_hypotheses, std::log(1 - options_.ransac_probability) / std::log(1 - right));
   };
   double needed = needed_for(best_);
