@@ -12,11 +12,17 @@
 namespace loc {
 namespace {
 
+constexpr TimeNs kMaxTime = TimeNs{1} << 61;  // farther ones are no times, and their differences overflow
+constexpr double kMaxTimeOffsetS = 1e6;
 constexpr std::size_t kMaxSamples = 50'000;  // of the IMU in the window
 constexpr std::size_t kMaxWindow = 2'000;    // frames in it
-constexpr double kMuchParallax = 25;         // in deviations: one minimum is likely the only one
+constexpr double kMuchParallax = 15;         // in deviations: one minimum is likely the only one
 constexpr double kSameCost = 1;              // difference of two results' costs that makes them one minimum
 constexpr double kLargeRatio = 1.2;          // of residuals to what is stated
+
+bool is_time(TimeNs time_ns) {
+  return time_ns > -kMaxTime && time_ns < kMaxTime;
+}
 
 void require_count(std::string_view name, int value, int least) {
   require(value >= least, name, value, "must be at least " + std::to_string(least));
@@ -134,15 +140,13 @@ const char* slam_start_outcome_name(SlamStartOutcome outcome) {
 
 SlamStart::SlamStart(const SlamStartOptions& options, const CameraCalibration& camera, const ImuNoise& noise,
                      double gravity)
-    : options_(options),
-      camera_(camera),
-      T_body_camera_(camera.T_body_camera),
-      time_offset_ns_(from_seconds(camera.time_offset_s)),
-      noise_(noise),
-      gravity_(gravity) {
+    : options_(options), camera_(camera), T_body_camera_(camera.T_body_camera), noise_(noise), gravity_(gravity) {
   options_.check();
   noise_.check();
   require_positive("gravity", gravity);
+  require(std::abs(camera.time_offset_s) <= kMaxTimeOffsetS, "time_offset_s", camera.time_offset_s,
+          "must not exceed a million seconds");
+  time_offset_ns_ = from_seconds(camera.time_offset_s);
 }
 
 void SlamStart::reset() {
@@ -169,6 +173,10 @@ void SlamStart::push(const ImuMeasurement& imu) {
     ++counts_.imu_not_finite;
     return;
   }
+  if (!is_time(imu.time_ns)) {
+    ++counts_.bad_times;
+    return;
+  }
   if (!imu_.empty()) {
     if (imu.time_ns <= imu_.back().time_ns) {
       ++counts_.imu_not_later;
@@ -185,6 +193,10 @@ void SlamStart::push(const ImuMeasurement& imu) {
 }
 
 void SlamStart::push(const FeaturesMeasurement& measurement) {
+  if (!is_time(measurement.time_ns)) {
+    ++counts_.bad_times;
+    return;
+  }
   Frame frame;
   frame.stamp_ns = measurement.time_ns;
   frame.time_ns = measurement.time_ns + time_offset_ns_;

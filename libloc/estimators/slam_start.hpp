@@ -38,17 +38,17 @@ struct SlamStartOptions {
   int min_frames = 6;
   int max_frames = 20;  ///< of more, so many spread evenly are looked at; bounds the cost, as does the next one
   int min_features = 10;
-  int max_features = 60;         ///< those with the longest tracks
-  int min_observations = 4;      ///< of a feature
-  double max_gap_s = 0.1;        ///< between IMU samples; a longer one begins anew [s]
-  double sigma_px = 1;           ///< deviation of one coordinate, of frames that do not say it [px]
-  double max_sigma_ratio = 3;    ///< residuals may be so much larger than that says; the covariance grows with them
-  double min_inliers = 0.6;      ///< share of observations that must fit
-  double min_parallax = 4;       ///< median over the features of the largest, in deviations of an observation
-  double max_scale_sigma = 0.2;  ///< relative deviation of the scale: of the mean inverse depth, and of the speed
-  double velocity_floor = 0.3;   ///< a deviation of the velocity below max_scale_sigma times this is good enough [m/s]
-  double max_tilt_sigma = 0.1;   ///< [rad]
-  double max_condition = 1e9;    ///< of the normal equations of v0, g and the biases, scaled to a unit diagonal
+  int max_features = 60;          ///< those with the longest tracks
+  int min_observations = 4;       ///< of a feature
+  double max_gap_s = 0.1;         ///< between IMU samples; a longer one begins anew [s]
+  double sigma_px = 1;            ///< deviation of one coordinate, of frames that do not say it [px]
+  double max_sigma_ratio = 1.5;   ///< residuals may be so much larger than that says; the covariance grows with them
+  double min_inliers = 0.6;       ///< share of observations that must fit
+  double min_parallax = 6;        ///< median over the features of the largest, in deviations of an observation
+  double max_scale_sigma = 0.15;  ///< relative deviation of the scale: of the mean inverse depth, and of the speed
+  double velocity_floor = 0.3;    ///< a deviation of the velocity below max_scale_sigma times this is good enough [m/s]
+  double max_tilt_sigma = 0.1;    ///< [rad]
+  double max_condition = 1e9;     ///< of the normal equations of v0, g and the biases, scaled to a unit diagonal
   double gyroscope_bias_sigma = 0.2;  ///< wide prior, so that turning about an axis that tells nothing does no harm
                                       ///< [rad/s]
   ImuSampling sampling = ImuSampling::kPoint;
@@ -104,7 +104,8 @@ const char* slam_start_outcome_name(SlamStartOutcome outcome);
 struct SlamStartCounts {
   std::int64_t imu_not_finite = 0;
   std::int64_t imu_not_later = 0;
-  std::int64_t imu_gaps = 0;  ///< times that it began anew
+  std::int64_t bad_times = 0;  ///< of samples and frames: kNoTime, or farther than 73 years from 0
+  std::int64_t imu_gaps = 0;   ///< times that it began anew
   std::int64_t frames_not_later = 0;
   std::int64_t features_bad = 0;  ///< negative or repeated identity, pixel not finite or without a ray
 };
@@ -149,7 +150,7 @@ class SlamStart {
   SlamStartOptions options_;
   Camera camera_;
   Pose3 T_body_camera_;
-  TimeNs time_offset_ns_;
+  TimeNs time_offset_ns_ = 0;
   ImuNoise noise_;
   double gravity_;
   std::deque<ImuMeasurement> imu_;
