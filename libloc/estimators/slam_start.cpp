@@ -16,7 +16,7 @@ constexpr TimeNs kMaxTime = TimeNs{1} << 61;  // farther ones are no times, and 
 constexpr double kMaxTimeOffsetS = 1e6;
 constexpr std::size_t kMaxSamples = 50'000;  // of the IMU in the window
 constexpr std::size_t kMaxWindow = 2'000;    // frames in it
-constexpr double kMuchParallax = 15;         // in deviations: one minimum is likely the only one
+constexpr double kMuchParallax = 20;         // in deviations: one minimum is likely the only one
 constexpr double kSameCost = 1;              // difference of two results' costs that makes them one minimum
 constexpr double kLargeRatio = 1.2;          // of residuals to what is stated
 

@@ -407,58 +407,6 @@ bool judge(const Problem& problem, const Refinement& refinement, Refined& out) {
 
 }  // namespace
 
-Eigen::Matrix<double, 3, 2> tangent(const Eigen::Vector3d& unit) {
-  Eigen::Matrix<double, 3, 2> out;
-  out.col(0) = unit.unitOrthogonal();
-  out.col(1) = unit.cross(out.col(0));
-  return out;
-}
-
-std::vector<PoseModel> pose_models(const Problem& problem, const Unknowns& x) {
-  const std::vector<FrameMotion> motion = integrate(problem, x.gyroscope_bias, x.accelerometer_bias);
-  std::vector<PoseModel> out;
-  out.reserve(motion.size());
-  for (std::size_t i = 0; i < motion.size(); ++i) {
-    const double t = problem.times_s[i];
-    PoseModel pose;
-    pose.rotation = motion[i].rotation;
-    pose.position = motion[i].shift + t * x.velocity + 0.5 * t * t * problem.gravity * x.down;
-    pose.by_motion.setZero();
-    pose.by_motion.block<3, 3>(3, kStartVelocity) = t * Eigen::Matrix3d::Identity();
-    pose.by_motion.block<3, 2>(3, kStartDown) = 0.5 * t * t * problem.gravity * tangent(x.down);
-    pose.by_motion.middleCols<6>(kStartGyroscopeBias) = motion[i].by_biases;
-    if (i > 0) {
-      const Eigen::Vector<double, 6> noise = x.noise.segment<6>(6 * (static_cast<Eigen::Index>(i) - 1));
-      const Eigen::Matrix3d turn = so3::exp(noise.head<3>()).toRotationMatrix();
-      pose.rotation *= turn;
-      pose.position += noise.tail<3>();
-      pose.by_motion.topRows<3>() = (turn.transpose() * pose.by_motion.topRows<3>()).eval();
-    }
-    out.push_back(pose);
-  }
-  return out;
-}
-
-std::optional<PixelModel> pixel_model(const Problem& problem, const Eigen::Matrix3d& rotation,
-                                      const Eigen::Vector3d& position, const Point& point) {
-  const Eigen::Matrix3d R_camera_body = problem.T_body_camera.rotation.conjugate().toRotationMatrix();
-  const Eigen::Vector3d& lever = problem.T_body_camera.translation;  // also the origin of the points
-  const Eigen::Matrix3d R_body_start = rotation.transpose();
-  // The point times its inverse distance: stays finite when that is zero.
-  const Eigen::Vector3d in_body = R_body_start * (point.direction - point.inverse_distance * (position - lever));
-  const auto projection =
-      problem.camera->project_with_jacobians(R_camera_body * (in_body - point.inverse_distance * lever));
-  if (!projection) return std::nullopt;
-  const Eigen::Matrix<double, 2, 3> by_body = projection->d_point * R_camera_body;
-  PixelModel out;
-  out.pixel_px = projection->pixel_px;
-  out.by_pose.leftCols<3>() = by_body * so3::hat(in_body);
-  out.by_pose.rightCols<3>() = -point.inverse_distance * by_body * R_body_start;
-  out.by_point.leftCols<2>() = by_body * R_body_start * tangent(point.direction);
-  out.by_point.col(2) = -by_body * (R_body_start * (position - lever) + lever);
-  return out;
-}
-
 std::optional<Refined> refine(Problem problem, const Eigen::Vector3d& gyroscope_bias, const ClosedForm& start) {
   Refined out;
   Unknowns& x = out.x;
