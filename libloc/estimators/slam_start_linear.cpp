@@ -87,6 +87,7 @@ Eigen::Vector3d direction_of_motion(const std::vector<Eigen::Vector3d>& normals,
   for (int iteration = 0; iteration < 4; ++iteration) {
     Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
     std::vector<double> residuals;
+    residuals.reserve(normals.size());
     for (const Eigen::Vector3d& n : normals) residuals.push_back(std::abs(t.dot(n)));
     std::vector<double> sorted = residuals;
     const double scale = std::max(sigma, 1.4826 * median(sorted));
@@ -103,7 +104,7 @@ Eigen::Vector3d direction_of_motion(const std::vector<Eigen::Vector3d>& normals,
 // |x| = size of the minimum of x^T S x - 2 r^T x, S symmetric: x = (S + lambda I)^-1 r, and |x| falls with lambda.
 std::optional<Eigen::Vector3d> minimum_on_sphere(const Eigen::Matrix3d& S, const Eigen::Vector3d& r, double size) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(S);
-  const Eigen::Vector3d values = eigen.eigenvalues();
+  const Eigen::Vector3d& values = eigen.eigenvalues();
   const Eigen::Vector3d along = eigen.eigenvectors().transpose() * r;
   const auto solution = [&](double lambda) { return Eigen::Vector3d(along.array() / (values.array() + lambda)); };
   double low = -values[0];                              // |x| is infinite here
@@ -286,8 +287,9 @@ std::optional<ClosedForm> closed_form(const Problem& problem, const Eigen::Vecto
   const double sigma = problem.ray_sigma();
   // Camera at frame i: t v0 + t^2 / 2 g + known.
   std::vector<Eigen::Vector3d> known;
+  known.reserve(motion.size());
   for (const FrameMotion& frame : motion) {
-    known.push_back(frame.shift + frame.rotation * problem.T_body_camera.translation);
+    known.emplace_back(frame.shift + frame.rotation * problem.T_body_camera.translation);
   }
   // Weights of the observations; at first all distances count as equal.
   std::vector<std::vector<double>> weights;
