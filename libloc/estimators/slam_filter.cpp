@@ -12,8 +12,8 @@
 namespace loc {
 namespace {
 
-constexpr int kFewest = 3;                // features in a frame that hold a pose
-constexpr double kNonlinearSigmas = 0.2;  // so far from where the Jacobians say: another iteration
+constexpr int kFewest = 3;              // features in a frame that hold a pose
+constexpr double kNonlinearSigmas = 1;  // so far from where the Jacobians say: another iteration
 
 double root_mean_square(double sum, int count) {
   return count > 0 ? std::sqrt(sum / count) : kUnknown;
@@ -37,7 +37,7 @@ SlamFilter::SlamFilter(const SlamOptions& options)
       covariance_(options.precision == SlamPrecision::kFloat, layout_.dim,
                   layout_.dim + kInverseDepthDim * options.map.max_features, 2 * std::max(options.map.max_measured, 3)),
       transition_(layout_),
-      ransac_(options.association, options.map.max_measured),
+      ransac_(options.association, options.motion, options.map.max_measured),
       dx_(covariance_.capacity()),
       shear_(covariance_.capacity(), 3) {
   const auto features = static_cast<std::size_t>(options.map.max_features);
@@ -414,10 +414,12 @@ void SlamFilter::judge(const FeaturesMeasurement& frame) {
   int used = 0;
   const double forget = 1 - 1.0 / (2 * options_.map.delete_after_tries);
   SlamCounts& counts = frame_.counts;
+  // A frame in which nothing was found says something of the frame, not of the features.
+  const bool any = frame_.nis_dim > 0;
   for (SlamLandmark& landmark : landmarks_) {
     const bool measured = landmark.state == SlamFeatureState::kMeasured || landmark.state == SlamFeatureState::kRescued;
     if (landmark.visible) ++counts.visible;
-    if (landmark.visible || landmark.observation >= 0) {
+    if (any && (landmark.visible || landmark.observation >= 0)) {
       landmark.tries = forget * landmark.tries + 1;
       // One that was found, but is not among the most informative, did nothing wrong.
       const bool fine = measured || (landmark.observation >= 0 && landmark.state == SlamFeatureState::kPredicted);

@@ -52,8 +52,13 @@ void SlamMapOptions::check() const {
           "must be from 0 to 1");
 }
 
+double SlamAssociationOptions::gate(SlamMotion motion) const {
+  if (gate_probability != 0) return gate_probability;
+  return motion == SlamMotion::kInertial ? 0.95 : 0.999;
+}
+
 void SlamAssociationOptions::check() const {
-  require_probability("association.gate_probability", gate_probability);
+  if (gate_probability != 0) require_probability("association.gate_probability", gate_probability);
   require_probability("association.ransac_probability", ransac_probability);
   require_at_least("association.max_hypotheses", max_hypotheses, 1);
 }

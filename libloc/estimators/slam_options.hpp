@@ -59,7 +59,7 @@ struct SlamMapOptions {
   double min_separation_px = 12;      ///< of a new feature from those in the map
   double border_px = 2;               ///< predicted nearer to the border: not expected to be seen
   double inverse_depth = 0.3;         ///< of a new feature (rho_0) [1/m]
-  double sigma_inverse_depth = 0.3;   ///< its deviation (sigma_rho); 0 must lie well within 2 sigma [1/m]
+  double sigma_inverse_depth = 0.2;   ///< its deviation (sigma_rho); 0 must lie within 2 sigma [1/m]
   bool depth_from_neighbours = true;  ///< rho_0 of a new feature is the median of those that are known; its deviation
                                       ///< grows with it
   double max_linearity_index = 0.07;  ///< below it a feature becomes XYZ (inverse_depth.hpp); 0: never
@@ -72,12 +72,15 @@ struct SlamMapOptions {
 
 /// Which measurements are believed.
 struct SlamAssociationOptions {
-  double gate_probability = 0.95;    ///< of a right measurement to pass: chi-square of 2
+  /// Of a right measurement to pass (chi-square of 2). 0: 0.95 with an IMU, which predicts well; 0.999 alone.
+  double gate_probability = 0;
   bool ransac = true;                ///< hypotheses from one measurement each; without it the gate alone
   double ransac_probability = 0.99;  ///< of having tried one right measurement at least
   int max_hypotheses = 50;
   std::uint64_t seed = 1;  ///< of the draws
 
+  /// The same, the default resolved.
+  double gate(SlamMotion motion) const;
   /// @throws std::invalid_argument naming the field and its value.
   void check() const;
 };

@@ -20,8 +20,8 @@ Eigen::Matrix2d block_of(const MapCovariance& covariance, int i, int j) {
 
 }  // namespace
 
-OnePointRansac::OnePointRansac(const SlamAssociationOptions& options, int capacity)
-    : options_(options), gate_(chi_square_quantile(options.gate_probability, 2)) {
+OnePointRansac::OnePointRansac(const SlamAssociationOptions& options, SlamMotion motion, int capacity)
+    : options_(options), gate_(chi_square_quantile(options.gate(motion), 2)) {
   best_.reserve(static_cast<std::size_t>(capacity));
   agrees_.reserve(static_cast<std::size_t>(capacity));
   order_.reserve(static_cast<std::size_t>(capacity));

@@ -28,7 +28,7 @@ namespace loc {
 class OnePointRansac {
  public:
   /// @param capacity largest number of measurements
-  OnePointRansac(const SlamAssociationOptions& options, int capacity);
+  OnePointRansac(const SlamAssociationOptions& options, SlamMotion motion, int capacity);
 
   /// @param covariance after innovate() of measurements of two numbers each @param residual two of each measurement
   /// @param sigma of a number's own noise @param draw changes the draws from frame to frame

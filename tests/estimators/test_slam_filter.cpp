@@ -226,7 +226,7 @@ TEST(SlamFilter, HeadingStaysUnobservable) {
     sigma.segment<3>(kGyroscopeBias).setConstant(1e-4);
     const Eigen::VectorXd n = direction(state);
     const Eigen::MatrixXd p = sigma.array().square().matrix().asDiagonal();
-    filter.start(SlamRide::time_ns(0), state, p + 4 * n * n.transpose());
+    filter.start(SlamRide::time_ns(0), state, p + 0.25 * n * n.transpose());
     for (int sample = 0; sample <= 400; ++sample) {
       const ImuMeasurement imu = world.imu(sample);
       if (sample > 0) {
@@ -236,12 +236,18 @@ TEST(SlamFilter, HeadingStaysUnobservable) {
       }
       if (sample % 10 == 0) filter.update(*world.frame(sample / 10));
     }
-    // The variance along the turn, with everything else given: 1 / (n^T P^-1 n).
+    // The variance of the heading, and how much of it the position shares as a turn says.
+    const Eigen::MatrixXd after = filter.head_covariance();
     const Eigen::VectorXd now = direction(filter.state());
-    return 1 / now.dot(filter.head_covariance().ldlt().solve(now));
+    const Eigen::Vector3d up = now.segment<3>(kTheta);
+    const double variance = up.dot(after.block<3, 3>(kTheta, kTheta) * up);
+    const Eigen::Vector3d shared = after.block<3, 3>(kPosition, kTheta) * up / variance;
+    return std::pair(variance, (shared - now.segment<3>(kPosition)).norm());
   };
-  EXPECT_NEAR(run(SlamConsistency::kInvariant), 4, 0.4);
-  EXPECT_LT(run(SlamConsistency::kPlain), 1) << "else the test would show nothing";
+  const auto [variance, off] = run(SlamConsistency::kInvariant);
+  EXPECT_NEAR(variance, 0.25, 0.02);
+  EXPECT_LT(off, 0.02);
+  EXPECT_LT(run(SlamConsistency::kPlain).first, 0.8 * variance) << "else the test would show nothing";
 }
 
 // NEES over seeds, inertial: a filter that is right says how wrong it is.

@@ -350,7 +350,7 @@ TEST(SlamAssociation, RightOnesAgreeAndWrongOnesDoNot) {
   Random random(6);
   SlamAssociationOptions options;
   options.gate_probability = 0.999;
-  OnePointRansac ransac(options, 40);
+  OnePointRansac ransac(options, SlamMotion::kInertial, 40);
   int lost = 0;
   for (std::uint64_t draw = 0; draw < 200; ++draw) {
     // The prior is off by up to 20, twelve of twenty agree on it, and eight are anywhere.
@@ -372,8 +372,8 @@ TEST(SlamAssociation, RightOnesAgreeAndWrongOnesDoNot) {
 TEST(SlamAssociation, SameDrawsSameAnswer) {
   Random random(7);
   const Sight sight = sight_of(random, {3, -2, 0}, 12, {{20, 20}, {-15, 4}});
-  OnePointRansac a({}, 40);
-  OnePointRansac b({}, 40);
+  OnePointRansac a({}, SlamMotion::kInertial, 40);
+  OnePointRansac b({}, SlamMotion::kInertial, 40);
   const std::vector<char> first = a.run(sight.covariance, sight.residual, 1, 5);
   EXPECT_EQ(first, b.run(sight.covariance, sight.residual, 1, 5));
   EXPECT_GE(a.hypotheses(), 0);
@@ -384,7 +384,7 @@ TEST(SlamAssociation, CompatibleTakesNoTwoThatContradict) {
   Random random(8);
   SlamAssociationOptions options;
   options.gate_probability = 0.99;
-  OnePointRansac ransac(options, 40);
+  OnePointRansac ransac(options, SlamMotion::kInertial, 40);
   const Sight sight = sight_of(random, {1, 1, 0}, 6, {{-9, 7}});
   const Eigen::Vector2d wrong(-9, 7);
   ASSERT_LT(wrong.squaredNorm() / 26, ransac.gate()) << "it would pass alone";
@@ -398,7 +398,7 @@ TEST(SlamAssociation, CompatibleIsTheJointTest) {
   Random random(9);
   SlamAssociationOptions options;
   options.gate_probability = 0.999;
-  OnePointRansac ransac(options, 40);
+  OnePointRansac ransac(options, SlamMotion::kInertial, 40);
   double sum = 0;
   for (int run = 0; run < 50; ++run) {
     const Sight sight = sight_of(random, 5 * random.normal3(), 15, {});
