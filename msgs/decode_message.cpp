@@ -10,6 +10,8 @@
 #include "loc/map_points_t.hpp"
 #include "loc/odometry_t.hpp"
 #include "loc/reference_t.hpp"
+#include "loc/slam_frame_t.hpp"
+#include "loc/slam_state_t.hpp"
 #include "loc/source_status_t.hpp"
 #include "loc/statistics_t.hpp"
 #include "loc/tracks_t.hpp"
@@ -41,6 +43,20 @@ void walk(wire::Walker& w, const image_t&) {
 void walk(wire::Walker& w, const map_points_t&) {
   w.skip(kStampBytes);
   w.array(w.int32(), 8 + 3 * 8 + 9 * 8);
+}
+void walk(wire::Walker& w, const slam_frame_t&) {
+  w.skip(kStampBytes + 4 + 1 + 8 + 9 * 4 + 3 * 8 + 4 + 7 * 8);
+  w.array(w.int32(), 8 + 1 + 1 + 11 * 8);
+}
+void walk(wire::Walker& w, const slam_state_t&) {
+  w.skip(8 + 1);
+  w.string();
+  w.string();
+  w.skip(2 * 4 + 4 * 8 + 1 + 4 * 8 + 7 * 8 + 2 * 8);
+  w.skip((4 + 5 * 3 + 7 + 1) * 8);
+  w.array(w.int32(), 6 * 8 + 3 + 22 * 8);
+  w.skip(4);
+  w.array(w.int32(), 8);
 }
 void walk(wire::Walker& w, const source_status_t&) {
   w.skip(8);
@@ -86,6 +102,8 @@ template magnetometer_t decode_message<magnetometer_t>(std::span<const std::uint
 template map_points_t decode_message<map_points_t>(std::span<const std::uint8_t>);
 template odometry_t decode_message<odometry_t>(std::span<const std::uint8_t>);
 template reference_t decode_message<reference_t>(std::span<const std::uint8_t>);
+template slam_frame_t decode_message<slam_frame_t>(std::span<const std::uint8_t>);
+template slam_state_t decode_message<slam_state_t>(std::span<const std::uint8_t>);
 template source_status_t decode_message<source_status_t>(std::span<const std::uint8_t>);
 template statistics_t decode_message<statistics_t>(std::span<const std::uint8_t>);
 template tracks_t decode_message<tracks_t>(std::span<const std::uint8_t>);

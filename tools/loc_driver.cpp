@@ -34,6 +34,9 @@ void add_sources(CLI::App& app, loc::SourceSpec& spec) {
   };
   add("euroc", "DIR", "EuRoC / ASL recording: IMU, magnetometer, reference");
   add("lcm-log", "FILE", "LCM log: types of package loc and of ASPN-23");
+  CLI::App* eqvio = add("eqvio", "FILE", "Tracks and IMU in one file, as GTSAM's EqVIO example reads them");
+  eqvio->add_option("--sigma-px", spec.eqvio.sigma_px,
+                    "Deviation of a feature's coordinate, which the file does not say");
   add("broad", "FILE", "Trial of the BROAD benchmark (*.mat)");
   CLI::App* csv = add("csv", "FILE", "Comma-separated samples, names and units in the first line");
   csv->add_option("--time-unit", spec.csv.time_unit, "ns, us, ms, s; where the heading has none");
@@ -86,7 +89,11 @@ int main(int argc, char** argv) {
     source.decode.channels = {};
     options.source_name = source.kind + " " + source.path;
     if (wait->count() > 0) options.wait_for_estimator_s = wait_for_estimator;
-    if (!config.empty()) loc::load_rig(config);
+    if (!config.empty()) {
+      const loc::Rig rig = loc::load_rig(config);
+      // Its pixels are those of a camera: of the user's, where there is one.
+      if (!rig.cameras.empty()) source.eqvio.camera = rig.cameras.front();
+    }
     options.live = loc::is_live(source.kind);
     // Before a device is touched.
     options.check();

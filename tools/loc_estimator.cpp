@@ -12,6 +12,7 @@
 #include "tools/support/pipeline.hpp"
 #include "tools/support/program.hpp"
 #include "tools/support/rig_option.hpp"
+#include "tools/support/slam_options.hpp"
 
 namespace {
 
@@ -26,15 +27,18 @@ struct Arguments {
   bool no_magnetometer = false;
   double reorder_delay_ms = 50;
   loc::FusionArguments fusion;
+  loc::SlamArguments slam;
   std::string start = "auto";
   loc::SourceSpec input;
   std::string output;
 };
 
-loc::SourceSpec input_of(const Arguments& arguments) {
+loc::SourceSpec input_of(const Arguments& arguments, const loc::Rig& rig) {
   loc::SourceSpec input = arguments.input;
   if (input.kind.empty()) input.kind = loc::guess_source_kind(input.path);
   input.decode.channels = arguments.live.channels;
+  // Pixels of a recording that has none are those of a camera: of the user's, where there is one.
+  if (!rig.cameras.empty()) input.eqvio.camera = rig.cameras.front();
   return input;
 }
 
@@ -49,18 +53,23 @@ loc::EstimatorSettings settings_of(const Arguments& arguments, const loc::Rig& r
     return settings;
   }
   if (loc::parse_world_frame(arguments.world) != loc::WorldFrame::kEnu) {
-    throw loc::UsageError("--world " + arguments.world + ": error-state estimates in ENU only");
+    throw loc::UsageError("--world " + arguments.world + ": " + arguments.method + " estimates in ENU only");
+  }
+  if (loc::is_slam(arguments.method)) {
+    settings.slam = loc::slam_options(arguments.slam, arguments.method, rig);
+    settings.slam_start = loc::slam_start(arguments.slam, settings.slam);
+    return settings;
   }
   settings.fusion = loc::fusion_options(arguments.fusion, arguments.preset, rig);
   if (arguments.start == "reference") {
-    const auto source = loc::open_source(input_of(arguments));
+    const auto source = loc::open_source(input_of(arguments, rig));
     settings.fusion.given_start = loc::start_from_reference(*source, settings.fusion, arguments.preset);
   }
   return settings;
 }
 
 int run_offline(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimator estimator) {
-  const loc::SourceSpec input = input_of(arguments);
+  const loc::SourceSpec input = input_of(arguments, rig);
   loc::refuse_to_overwrite(input.path, arguments.output);
   const auto source = loc::open_source(input);
   const auto output = loc::open_estimate_output(arguments.output, estimator.method(), estimator.world());
@@ -69,12 +78,19 @@ int run_offline(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimat
     ++estimates;
     output->write(estimate);
   });
+  loc::Stamp last_frame;
+  pipeline.set_frame_sink([&](const loc::SlamFrame& frame) {
+    output->write_frame(frame);
+    last_frame = frame;
+  });
   while (auto measurement = source->next()) {
     if (loc::stop_requested()) break;
     pipeline.push(std::move(*measurement));
   }
   pipeline.end();
+  if (const loc::SlamFilter* slam = pipeline.estimator().slam()) output->write_map(last_frame, slam->map());
   output->finish();
+  const bool map_written = loc::write_map(arguments.slam, pipeline.estimator().slam());
   loc::log_info("event=ended interrupted={} estimates={} output=\"{}\" source=\"{}\" {} {}", loc::stop_requested(),
                 estimates, arguments.output, input.path, loc::format_counts(source->counts()),
                 loc::format_counts(pipeline.counts()));
@@ -87,10 +103,10 @@ int run_offline(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimat
     loc::log_warning("event=implausible_unit source=\"{}\" reason=\"{}\"", input.path, doubt);
   }
   if (estimates == 0) {
-    loc::log_error("event=no_estimate source=\"{}\" reason=\"no IMU sample could be used\"", input.path);
+    loc::log_error("event=no_estimate source=\"{}\" reason=\"no sample could be used\"", input.path);
     return loc::kExitFailed;
   }
-  return loc::stop_requested() ? loc::kExitFailed : loc::kExitOk;
+  return loc::stop_requested() || !map_written ? loc::kExitFailed : loc::kExitOk;
 }
 
 int run_live(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimator estimator) {
@@ -102,7 +118,7 @@ int run_live(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimator 
     loc::log_warning("event=implausible_unit reason=\"{}\"", doubt);
   }
   loc::log_info("event=ended {} {}", loc::format_counts(live.counts()), loc::format_latency("latency", live.latency()));
-  return loc::kExitOk;
+  return loc::write_map(arguments.slam, live.estimator().slam()) ? loc::kExitOk : loc::kExitFailed;
 }
 
 }  // namespace
@@ -110,8 +126,9 @@ int run_live(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimator 
 int main(int argc, char** argv) {
   Arguments arguments;
   loc::Program program("loc-estimator",
-                       "Estimates orientation (madgwick) or a whole trajectory (error-state: IMU with GPS, odometry, "
-                       "magnetometer) from the measurements on LCM, or in a recording.");
+                       "Estimates orientation (madgwick), a whole trajectory (error-state: IMU with GPS, odometry, "
+                       "magnetometer), or trajectory and map (mono-slam, inertial-slam: tracks of features) from the "
+                       "measurements on LCM, or in a recording.");
   CLI::App& app = program.app();
   arguments.live.lcm_url.clear();
   program.add_lcm_url(arguments.live.lcm_url);
@@ -130,6 +147,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--no-magnetometer", arguments.no_magnetometer, "Heading from the gyroscope alone");
   loc::add_fusion_options(app, arguments.fusion);
+  loc::add_slam_options(app, arguments.slam);
   loc::add_channel_option(app, arguments.channels);
   app.add_option("--estimate-channel", arguments.live.estimate_channel, "Channel of the estimates")
       ->capture_default_str();
@@ -143,8 +161,8 @@ int main(int argc, char** argv) {
   app.add_flag("--exit-at-end", arguments.live.exit_at_end, "End when the source says that it has ended");
   app.add_flag("--statistics", arguments.live.statistics, "Log and publish counters once per second");
   CLI::Option* input = app.add_option("--input", arguments.input.path, "Off line: the recording to read");
-  app.add_option("--input-kind", arguments.input.kind, "euroc, lcm-log, csv, broad; otherwise by its looks")
-      ->check(CLI::IsMember({"euroc", "lcm-log", "csv", "broad"}))
+  app.add_option("--input-kind", arguments.input.kind, "euroc, lcm-log, csv, eqvio, broad; otherwise by its looks")
+      ->check(CLI::IsMember({"euroc", "lcm-log", "csv", "eqvio", "broad"}))
       ->needs(input);
   CLI::Option* output =
       app.add_option("--output", arguments.output, "Off line: *.csv, *.tum, or *.lcm (an LCM log)")->needs(input);
@@ -160,7 +178,21 @@ int main(int argc, char** argv) {
     if (arguments.start == "reference" && (input->count() == 0 || arguments.method != "error-state")) {
       throw loc::UsageError("--start reference: for --method error-state with --input only");
     }
-    const loc::Rig rig = loc::load_rig(arguments.config);
+    loc::Rig rig = loc::load_rig(arguments.config);
+    if (!loc::is_slam(arguments.method)) {
+      for (const CLI::Option* option : {arguments.slam.config_option, arguments.slam.map_in_option,
+                                        arguments.slam.map_out_option, arguments.slam.camera_option}) {
+        if (option->count() > 0) {
+          throw loc::UsageError(option->get_name() + ": for --method mono-slam and inertial-slam only");
+        }
+      }
+    } else if (input->count() > 0 && rig.cameras.empty()) {
+      // An explicit --config wins over what the recording says.
+      rig.cameras = loc::rig_of_source(input_of(arguments, rig)).cameras;
+    }
+    if (input->count() > 0 && !arguments.slam.map_out.empty()) {
+      loc::refuse_to_overwrite(arguments.input.path, arguments.slam.map_out);
+    }
     loc::AnyEstimator estimator = loc::make_estimator(settings_of(arguments, rig, beta->count() > 0));
     return input->count() > 0 ? run_offline(arguments, rig, std::move(estimator))
                               : run_live(arguments, rig, std::move(estimator));

@@ -11,6 +11,8 @@
 #include "bindings.hpp"
 #include "loc/clock_t.hpp"
 #include "loc/map_points_t.hpp"
+#include "loc/slam_frame_t.hpp"
+#include "loc/slam_state_t.hpp"
 #include "loc/source_status_t.hpp"
 #include "loc/statistics_t.hpp"
 #include "loc/tracks_t.hpp"
@@ -34,12 +36,12 @@ TypeEntry entry() {
           [](std::span<const std::uint8_t> data) { static_cast<void>(loc::decode_message<T>(data)); }};
 }
 
-const std::array<TypeEntry, 13>& types() {
-  static const std::array<TypeEntry, 13> all = {
-      entry<loc::imu_t>(),        entry<loc::magnetometer_t>(),  entry<loc::image_t>(),  entry<loc::gps_fix_t>(),
-      entry<loc::reference_t>(),  entry<loc::estimate_t>(),      entry<loc::tracks_t>(), entry<loc::map_points_t>(),
-      entry<loc::statistics_t>(), entry<loc::source_status_t>(), entry<loc::clock_t>(),  entry<loc::odometry_t>(),
-      entry<loc::fusion_t>()};
+const std::array<TypeEntry, 15>& types() {
+  static const std::array<TypeEntry, 15> all = {
+      entry<loc::imu_t>(),        entry<loc::magnetometer_t>(),  entry<loc::image_t>(),     entry<loc::gps_fix_t>(),
+      entry<loc::reference_t>(),  entry<loc::estimate_t>(),      entry<loc::tracks_t>(),    entry<loc::map_points_t>(),
+      entry<loc::statistics_t>(), entry<loc::source_status_t>(), entry<loc::clock_t>(),     entry<loc::odometry_t>(),
+      entry<loc::fusion_t>(),     entry<loc::slam_frame_t>(),    entry<loc::slam_state_t>()};
   return all;
 }
 

@@ -30,7 +30,20 @@ AnyEstimator make_error_state(const EstimatorSettings& settings) {
   return {"error-state", world_frame_name(WorldFrame::kEnu), std::move(inputs), InertialFusion(options)};
 }
 
-constexpr std::array kMethods = {Method{"madgwick", make_madgwick}, Method{"error-state", make_error_state}};
+// The IMU tells a driver how far the estimator has got (flow_control.hpp), though the camera alone has no use for it.
+const std::vector<StreamKind> kSlamInputs = {StreamKind::kImu, StreamKind::kFeatures};
+
+AnyEstimator make_mono_slam(const EstimatorSettings& settings) {
+  return {"mono-slam", world_frame_name(WorldFrame::kEnu), kSlamInputs, MonoSlam(settings.slam), settings.slam_start};
+}
+
+AnyEstimator make_inertial_slam(const EstimatorSettings& settings) {
+  return {"inertial-slam", world_frame_name(WorldFrame::kEnu), kSlamInputs, InertialSlam(settings.slam),
+          settings.slam_start};
+}
+
+constexpr std::array kMethods = {Method{"madgwick", make_madgwick}, Method{"error-state", make_error_state},
+                                 Method{"mono-slam", make_mono_slam}, Method{"inertial-slam", make_inertial_slam}};
 
 }  // namespace
 
@@ -48,11 +61,20 @@ AnyEstimator make_estimator(const EstimatorSettings& settings) {
 }
 
 AnyEstimator::AnyEstimator(std::string method, std::string world, std::vector<StreamKind> inputs,
-                           Implementation implementation)
+                           Implementation implementation, std::optional<SlamSnapshot> start)
     : method_(std::move(method)),
       world_(std::move(world)),
       inputs_(std::move(inputs)),
-      implementation_(std::move(implementation)) {}
+      implementation_(std::move(implementation)),
+      start_(std::move(start)) {
+  restore();
+}
+
+void AnyEstimator::restore() {
+  if (!start_) return;
+  if (auto* mono = std::get_if<MonoSlam>(&implementation_)) mono->restore(*start_);
+  if (auto* inertial = std::get_if<InertialSlam>(&implementation_)) inertial->restore(*start_);
+}
 
 bool AnyEstimator::takes(StreamKind kind) const {
   return std::find(inputs_.begin(), inputs_.end(), kind) != inputs_.end();
@@ -64,7 +86,8 @@ bool AnyEstimator::takes_late(StreamKind kind) const {
 }
 
 bool AnyEstimator::process(const Measurement& measurement) {
-  return std::visit([&](auto& estimator) { return estimator.process(measurement); }, implementation_);
+  gave_estimate_ = std::visit([&](auto& estimator) { return estimator.process(measurement); }, implementation_);
+  return gave_estimate_;
 }
 
 Estimate AnyEstimator::estimate() const {
@@ -77,6 +100,27 @@ NamedCounts AnyEstimator::counts() const {
 
 void AnyEstimator::reset() {
   std::visit([](auto& estimator) { estimator.reset(); }, implementation_);
+  gave_estimate_ = false;
+  restore();
+}
+
+std::span<const SlamFrame> AnyEstimator::slam_frames() const {
+  if (const auto* inertial = std::get_if<InertialSlam>(&implementation_)) return inertial->frames();
+  const auto* mono = std::get_if<MonoSlam>(&implementation_);
+  if (mono == nullptr || !gave_estimate_) return {};
+  return {&mono->frame(), 1};
+}
+
+std::vector<SlamMapPoint> AnyEstimator::slam_map() const {
+  const SlamFilter* filter = slam();
+  return filter != nullptr ? filter->map() : std::vector<SlamMapPoint>{};
+}
+
+const SlamFilter* AnyEstimator::slam() const {
+  const SlamFilter* filter = nullptr;
+  if (const auto* mono = std::get_if<MonoSlam>(&implementation_)) filter = &mono->filter();
+  if (const auto* inertial = std::get_if<InertialSlam>(&implementation_)) filter = &inertial->filter();
+  return filter != nullptr && filter->started() ? filter : nullptr;
 }
 
 }  // namespace loc

@@ -2,13 +2,17 @@
 // entry of the table in any_estimator.cpp and its own options in EstimatorSettings.
 #pragma once
 
+#include <optional>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "libloc/estimators/estimator.hpp"
 #include "libloc/estimators/inertial_fusion.hpp"
+#include "libloc/estimators/inertial_slam.hpp"
 #include "libloc/estimators/madgwick.hpp"
+#include "libloc/estimators/mono_slam.hpp"
 
 namespace loc {
 
@@ -17,6 +21,8 @@ struct EstimatorSettings {
   bool use_magnetometer = true;
   MadgwickOptions madgwick = MadgwickOptions::robust();
   InertialFusionOptions fusion = InertialFusionOptions::robust();  ///< its use_magnetometer is overruled
+  SlamOptions slam;                                                ///< its motion must be the method's
+  std::optional<SlamSnapshot> slam_start;  ///< where SLAM goes on from, at its start and after each reset
 };
 
 /// Names that make_estimator() knows.
@@ -24,9 +30,11 @@ std::vector<std::string> estimator_methods();
 
 class AnyEstimator {
  public:
-  using Implementation = std::variant<MadgwickFilter, InertialFusion>;
+  using Implementation = std::variant<MadgwickFilter, InertialFusion, MonoSlam, InertialSlam>;
 
-  AnyEstimator(std::string method, std::string world, std::vector<StreamKind> inputs, Implementation implementation);
+  /// @param start for SLAM: a state to go on from @throws std::invalid_argument when it does not fit
+  AnyEstimator(std::string method, std::string world, std::vector<StreamKind> inputs, Implementation implementation,
+               std::optional<SlamSnapshot> start = {});
 
   const std::string& method() const { return method_; }
   const std::string& world() const { return world_; }
@@ -42,11 +50,22 @@ class AnyEstimator {
   NamedCounts counts() const;
   void reset();
 
+  // Of SLAM; the others have nothing there.
+  /// Frames that the last process() has completed, until the next one.
+  std::span<const SlamFrame> slam_frames() const;
+  std::vector<SlamMapPoint> slam_map() const;
+  /// @return nullptr before the start, too.
+  const SlamFilter* slam() const;
+
  private:
+  void restore();
+
   std::string method_;
   std::string world_;
   std::vector<StreamKind> inputs_;
   Implementation implementation_;
+  std::optional<SlamSnapshot> start_;
+  bool gave_estimate_ = false;  // the last process()
 };
 static_assert(Estimator<AnyEstimator>);
 

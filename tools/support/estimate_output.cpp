@@ -8,6 +8,7 @@
 #include "libloc/io/lcm_log.hpp"
 #include "libloc/io/tum.hpp"
 #include "msgs/convert.hpp"
+#include "msgs/slam_messages.hpp"
 #include "tools/support/log.hpp"
 #include "tools/support/program.hpp"
 
@@ -69,19 +70,25 @@ class LogOutput : public EstimateOutput {
   LogOutput(const std::string& path, std::string method, std::string world)
       : writer_(path), method_(std::move(method)), world_(std::move(world)) {}
   void write(const Estimate& estimate) override {
-    const estimate_t message = to_message(estimate, method_, world_);
-    bytes_.resize(static_cast<std::size_t>(message.getEncodedSize()));
-    message.encode(bytes_.data(), 0, static_cast<int>(bytes_.size()));
-    writer_.write(estimate.time_ns / 1000, kEstimateChannel, bytes_);
-    if (const auto more = to_fusion_message(estimate)) {
-      bytes_.resize(static_cast<std::size_t>(more->getEncodedSize()));
-      more->encode(bytes_.data(), 0, static_cast<int>(bytes_.size()));
-      writer_.write(estimate.time_ns / 1000, kFusionChannel, bytes_);
-    }
+    write_message(estimate.time_ns, kEstimateChannel, to_message(estimate, method_, world_));
+    if (const auto more = to_fusion_message(estimate)) write_message(estimate.time_ns, kFusionChannel, *more);
+  }
+  void write_frame(const SlamFrame& frame) override {
+    write_message(frame.time_ns, kSlamFrameChannel, to_message(frame));
+  }
+  void write_map(const Stamp& stamp, std::span<const SlamMapPoint> map) override {
+    write_message(stamp.time_ns, kMapChannel, to_message(stamp, map));
   }
   void finish() override { writer_.flush(); }
 
  private:
+  template <class Message>
+  void write_message(TimeNs time_ns, const char* channel, const Message& message) {
+    bytes_.resize(static_cast<std::size_t>(message.getEncodedSize()));
+    message.encode(bytes_.data(), 0, static_cast<int>(bytes_.size()));
+    writer_.write(time_ns / 1000, channel, bytes_);
+  }
+
   LcmLogWriter writer_;
   std::string method_;
   std::string world_;

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 
 #include "libloc/estimators/estimate.hpp"
+#include "libloc/estimators/slam_frame.hpp"
 
 namespace loc {
 
@@ -15,6 +17,9 @@ class EstimateOutput {
   EstimateOutput& operator=(const EstimateOutput&) = delete;
   virtual ~EstimateOutput() = default;
   virtual void write(const Estimate& estimate) = 0;
+  /// Only LCM logs hold what SLAM says of its frames, and its map.
+  virtual void write_frame(const SlamFrame& /*frame*/) {}
+  virtual void write_map(const Stamp& /*stamp*/, std::span<const SlamMapPoint> /*map*/) {}
   /// To be called at the end. @throws DataError when not everything could be written.
   virtual void finish() = 0;
 };

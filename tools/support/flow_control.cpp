@@ -26,7 +26,9 @@ void FlowControl::abandon() {
 
 void FlowControl::on_estimate(std::span<const std::uint8_t> data) {
   try {
-    acknowledge(decode_message<estimate_t>(data).sequence);
+    const auto estimate = decode_message<estimate_t>(data);
+    // Estimates of a camera alone carry numbers of frames.
+    if (estimate.method != kFrameMethod) acknowledge(estimate.sequence);
   } catch (const DataError&) {
     ++garbage_;
   }

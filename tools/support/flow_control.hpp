@@ -12,6 +12,7 @@
 namespace loc {
 
 inline constexpr const char* kImuSequence = "imu.sequence";
+inline constexpr const char* kFrameMethod = "mono-slam";
 inline constexpr const char* kEstimatorProgram = "loc-estimator";
 
 class FlowControl {

@@ -8,6 +8,7 @@
 #include "libloc/core/check.hpp"
 #include "loc/source_status_t.hpp"
 #include "msgs/convert.hpp"
+#include "msgs/slam_messages.hpp"
 #include "tools/support/flow_control.hpp"
 #include "tools/support/log.hpp"
 #include "tools/support/program.hpp"
@@ -79,6 +80,7 @@ LiveEstimator::LiveEstimator(LiveEstimatorOptions options, AnyEstimator estimato
       pipeline_(std::move(estimator), std::move(rig), options_.merger,
                 [this](const Estimate& estimate) { publish_estimate(estimate); }),
       refused_(inputs_.size() + 1) {
+  pipeline_.set_frame_sink([this](const SlamFrame& frame) { publish_frame(frame); });
   const DecodeOptions channels = decode_options(pipeline_.estimator(), options_);
   for (const StreamKind kind : inputs_) channels_.push_back(channels.channels[static_cast<std::size_t>(kind)]);
   // Last: who gets an answer to a status knows that the streams before it are subscribed to.
@@ -188,6 +190,15 @@ void LiveEstimator::publish_estimate(const Estimate& estimate) {
     latency_.add(message.publish_time_ns - estimate.host_time_ns);
   }
   if (const auto more = to_fusion_message(estimate)) publisher_.publish(options_.fusion_channel, *more);
+}
+
+void LiveEstimator::publish_frame(const SlamFrame& frame) {
+  publisher_.publish(kSlamFrameChannel, to_message(frame));
+  const bool due =
+      last_map_ns_ == kNoTime || frame.time_ns < last_map_ns_ || frame.time_ns - last_map_ns_ >= options_.map_period_ns;
+  if (!due) return;
+  last_map_ns_ = frame.time_ns;
+  publisher_.publish(kMapChannel, to_message(frame, pipeline_.estimator().slam_map()));
 }
 
 void LiveEstimator::publish_statistics() {

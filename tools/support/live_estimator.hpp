@@ -22,6 +22,7 @@ struct LiveEstimatorOptions {
   std::array<std::string, kStreamKinds> channels;  ///< empty: default_channel()
   std::string estimate_channel = "LOC_ESTIMATE";
   std::string fusion_channel = "LOC_FUSION";
+  TimeNs map_period_ns = 1'000'000'000;  ///< of SLAM's map on LOC_MAP, in measurement time
   StreamMergerOptions merger;
   std::size_t queue_capacity = 16384;  ///< messages of each stream but images
   std::size_t image_capacity = 4;
@@ -41,6 +42,7 @@ class LiveEstimator {
   std::vector<std::string> unit_doubts() const { return pipeline_.unit_doubts(); }
   /// From publishing a sample (its host_time_ns) to publishing its estimate.
   const LatencyHistogram& latency() const { return latency_; }
+  const AnyEstimator& estimator() const { return pipeline_.estimator(); }
   /// Samples of a stream that may not lose any were lost before the estimator: dropped by a full queue.
   std::int64_t dropped() const;
 
@@ -50,6 +52,7 @@ class LiveEstimator {
   void handle_measurement(const RawMessage& message);
   void handle_source_status(const RawMessage& message);
   void publish_estimate(const Estimate& estimate);
+  void publish_frame(const SlamFrame& frame);
   void publish_statistics();
   void report_each_second();
   void refuse(std::size_t input, const std::string& reason);
@@ -66,6 +69,7 @@ class LiveEstimator {
   std::vector<std::int64_t> refused_;
   std::atomic<bool> stop_receiving_ = false;
   bool source_ended_ = false;
+  TimeNs last_map_ns_ = kNoTime;
   TimeNs next_report_ns_ = 0;
   TimeNs next_answer_ns_ = 0;
 };

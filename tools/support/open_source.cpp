@@ -33,7 +33,7 @@ bool is_live(const std::string& source_kind) {
 std::string guess_source_kind(const std::string& path) {
   if (std::filesystem::is_directory(path)) return "euroc";
   const std::string extension = std::filesystem::path(path).extension();
-  if (extension == ".csv") return "csv";
+  if (extension == ".csv") return is_eqvio(path) ? "eqvio" : "csv";
   if (extension == ".mat") return "broad";
   if (extension == ".nmea" || holds_nmea(path)) return "nmea";
   return "lcm-log";
@@ -47,10 +47,17 @@ std::unique_ptr<MeasurementSource> open_source(const SourceSpec& spec) {
   if (!std::filesystem::exists(spec.path, error)) throw UsageError("'" + spec.path + "' does not exist");
   if (spec.kind == "euroc") return open_euroc(spec.path);
   if (spec.kind == "csv") return open_csv(spec.path, spec.csv);
+  if (spec.kind == "eqvio") return open_eqvio(spec.path, spec.eqvio);
   if (spec.kind == "broad") return open_broad(spec.path);
   if (spec.kind == "lcm-log") return open_lcm_log(spec.path, {.decode = spec.decode});
   if (spec.kind == "nmea") return open_nmea(spec.path, spec.gps.fix);
-  throw UsageError("source '" + spec.kind + "' is not euroc, lcm-log, csv, broad, nmea, gps-serial, gps-tcp or gpsd");
+  throw UsageError("source '" + spec.kind +
+                   "' is not euroc, lcm-log, csv, eqvio, broad, nmea, gps-serial, gps-tcp or gpsd");
+}
+
+Rig rig_of_source(const SourceSpec& spec) {
+  if (spec.kind != "eqvio") return {};
+  return open_eqvio(spec.path, spec.eqvio)->rig();
 }
 
 void refuse_to_overwrite(const std::string& recording, const std::string& output) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "libloc/io/csv.hpp"
+#include "libloc/io/eqvio.hpp"
 #include "libloc/io/source.hpp"
 #include "msgs/decode.hpp"
 #include "tools/support/gps_source.hpp"
@@ -12,9 +13,10 @@
 namespace loc {
 
 struct SourceSpec {
-  std::string kind;      ///< "euroc", "lcm-log", "csv", "broad", "nmea"; live: "gps-serial", "gps-tcp", "gpsd"
+  std::string kind;      ///< "euroc", "lcm-log", "csv", "eqvio", "broad", "nmea"; live: "gps-serial", "gps-tcp", "gpsd"
   std::string path;      ///< file, folder, device, HOST:PORT
   CsvOptions csv;        ///< for csv
+  EqvioOptions eqvio;    ///< for eqvio
   DecodeOptions decode;  ///< for lcm-log: channels
   LiveGpsOptions gps;    ///< for nmea (gps.fix) and the live ones
   int baud = 9600;       ///< for gps-serial
@@ -23,13 +25,17 @@ struct SourceSpec {
 /// A kind that is a sensor connected now, not a recording.
 bool is_live(const std::string& source_kind);
 
-/// Kind of a recording by its looks: a folder is euroc, *.csv csv, *.mat broad, *.nmea nmea, another file that has NMEA
-/// sentences within its first 4 kB nmea, all else lcm-log.
+/// Kind of a recording by its looks: a folder is euroc, *.csv eqvio by its heading, otherwise csv, *.mat broad, *.nmea
+/// nmea, another file that has NMEA sentences within its first 4 kB nmea, all else lcm-log.
 std::string guess_source_kind(const std::string& path);
 
 /// @throws UsageError for an unknown kind or a path that does not exist, DataError as the reader of that kind,
 /// GpsConnectionError when a live source cannot be reached.
 std::unique_ptr<MeasurementSource> open_source(const SourceSpec& spec);
+
+/// The rig that a recording brings along: eqvio's camera, unless spec.eqvio has one; empty for all other kinds.
+/// @throws as open_source.
+Rig rig_of_source(const SourceSpec& spec);
 
 /// An output must not replace the recording that is being read, by whatever name it is reached.
 /// @throws UsageError naming both when they are one file.

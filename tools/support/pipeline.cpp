@@ -93,9 +93,12 @@ void EstimatorPipeline::drain() {
 }
 
 void EstimatorPipeline::process(const Measurement& measurement) {
-  if (!estimator_.process(measurement)) return;
-  ++estimates_;
-  sink_(estimator_.estimate());
+  if (estimator_.process(measurement)) {
+    ++estimates_;
+    sink_(estimator_.estimate());
+  }
+  if (!frame_sink_) return;
+  for (const SlamFrame& frame : estimator_.slam_frames()) frame_sink_(frame);
 }
 
 NamedCounts EstimatorPipeline::counts() const {

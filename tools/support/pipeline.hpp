@@ -41,9 +41,13 @@ class SequenceCheck {
 class EstimatorPipeline {
  public:
   using Sink = std::function<void(const Estimate&)>;
+  using FrameSink = std::function<void(const SlamFrame&)>;
 
   /// @throws std::invalid_argument when the rig or the merger's options are wrong.
   EstimatorPipeline(AnyEstimator estimator, Rig rig, const StreamMergerOptions& merger, Sink sink);
+
+  /// Who takes what SLAM says about frames.
+  void set_frame_sink(FrameSink sink) { frame_sink_ = std::move(sink); }
 
   /// Takes the next sample as it arrives. Streams that the estimator does not take are left aside.
   void push(Measurement measurement);
@@ -70,6 +74,7 @@ class EstimatorPipeline {
   SequenceCheck sequences_;
   UnitCheck units_;
   Sink sink_;
+  FrameSink frame_sink_;
   bool ended_ = false;
   std::int64_t estimates_ = 0;
   std::array<std::int64_t, kStreamKinds> passed_late_{};

@@ -1,0 +1,42 @@
+// The options of --method mono-slam and inertial-slam, and the map as a file.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "libloc/estimators/slam_filter.hpp"
+#include "libloc/sensors/rig.hpp"
+#include "tools/support/cli_forward.hpp"
+
+namespace loc {
+
+struct SlamArguments {
+  std::string config;
+  std::string map_in;
+  std::string map_out;
+  int camera = 0;
+  CLI::Option* config_option = nullptr;
+  CLI::Option* map_in_option = nullptr;
+  CLI::Option* map_out_option = nullptr;
+  CLI::Option* camera_option = nullptr;
+};
+
+void add_slam_options(CLI::App& app, SlamArguments& arguments);
+bool is_slam(const std::string& method);
+
+/// @param method mono-slam or inertial-slam @param rig has the camera, and the noise of the IMU where it has one, which
+/// the file of settings may overrule
+/// @throws UsageError for a rig without that camera, a file that says another motion; std::invalid_argument as
+/// SlamOptions::check.
+SlamOptions slam_options(const SlamArguments& arguments, const std::string& method, const Rig& rig);
+
+/// What --map-in has; nullopt when it was not given. @throws UsageError when it cannot be read, or was made with
+/// another camera or motion.
+std::optional<SlamSnapshot> slam_start(const SlamArguments& arguments, const SlamOptions& options);
+
+/// Writes --map-out: *.ply has the points, all others what --map-in can go on from. Logs what it did.
+/// @param filter nullptr: it has not started; said aloud, nothing is written. @return false then
+/// @throws DataError when it cannot be written.
+bool write_map(const SlamArguments& arguments, const SlamFilter* filter);
+
+}  // namespace loc
