@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <type_traits>
+#include <utility>
 
 #include "libloc/core/check.hpp"
 #include "libloc/io/text_file.hpp"
@@ -16,6 +17,7 @@ namespace {
 constexpr const char* kFormat = "libloc-slam-1";
 constexpr std::array<const char*, 2> kMotions = {"constant-velocity", "inertial"};
 constexpr std::array<const char*, 3> kConsistencies = {"plain", "first-estimate", "invariant"};
+constexpr std::array<const char*, 2> kSamplings = {"point", "interval-mean"};
 constexpr std::array<const char*, 2> kPrecisions = {"double", "float"};
 
 // One list of the fields, for reading and writing. The names are those of the structs.
@@ -81,6 +83,28 @@ void visit_fields(Visitor& v, Options& o) requires std::is_same_v<std::remove_co
 }
 
 template <class Visitor, class Options>
+void visit_fields(Visitor& v, Options& o) requires std::is_same_v<std::remove_const_t<Options>, SlamStartOptions> {
+  v.field("min_duration_s", o.min_duration_s);
+  v.field("max_duration_s", o.max_duration_s);
+  v.field("min_frames", o.min_frames);
+  v.field("max_frames", o.max_frames);
+  v.field("min_features", o.min_features);
+  v.field("max_features", o.max_features);
+  v.field("min_observations", o.min_observations);
+  v.field("max_gap_s", o.max_gap_s);
+  v.field("sigma_px", o.sigma_px);
+  v.field("max_sigma_ratio", o.max_sigma_ratio);
+  v.field("min_inliers", o.min_inliers);
+  v.field("min_parallax", o.min_parallax);
+  v.field("max_scale_sigma", o.max_scale_sigma);
+  v.field("velocity_floor", o.velocity_floor);
+  v.field("max_tilt_sigma", o.max_tilt_sigma);
+  v.field("max_condition", o.max_condition);
+  v.field("gyroscope_bias_sigma", o.gyroscope_bias_sigma);
+  v.choice("sampling", o.sampling, kSamplings);
+}
+
+template <class Visitor, class Options>
 void visit_fields(Visitor& v, Options& o) requires std::is_same_v<std::remove_const_t<Options>, StandStillOptions> {
   v.field("window_s", o.window_s);
   v.field("min_duration_s", o.min_duration_s);
@@ -99,6 +123,7 @@ void visit_fields(Visitor& v, Options& o) requires std::is_same_v<std::remove_co
   v.choice("motion", o.motion, kMotions);
   v.choice("consistency", o.consistency, kConsistencies);
   v.choice("precision", o.precision, kPrecisions);
+  v.field("max_iterations", o.max_iterations);
   v.field("camera_index", o.camera_index);
   v.field("position", o.position);
   v.field("q_world_body", o.q_world_body);
@@ -111,6 +136,7 @@ void visit_fields(Visitor& v, Options& o) requires std::is_same_v<std::remove_co
   v.field("acceleration_density", o.acceleration_density);
   v.field("angular_acceleration_density", o.angular_acceleration_density);
   v.block("imu_noise", o.imu_noise);
+  v.field("vibration_part", o.vibration_part);
   v.field("gravity", o.gravity);
   v.field("sigma_px", o.sigma_px);
   v.field("override_sigma", o.override_sigma);
@@ -124,6 +150,8 @@ void visit_fields(Visitor& v, Options& o) requires std::is_same_v<std::remove_co
   v.block("association", o.association);
   v.field("max_gap_s", o.max_gap_s);
   v.block("start", o.start);
+  v.block("moving_start", o.moving_start);
+  v.field("moving_start_factor", o.moving_start_factor);
   v.block("stand_still", o.stand_still);
   v.field("zero_velocity", o.zero_velocity);
   v.field("zero_velocity_sigma", o.zero_velocity_sigma);
@@ -135,6 +163,7 @@ void visit_fields(Visitor& v, Options& o) requires std::is_same_v<std::remove_co
   v.field("gap_angular_velocity_sigma", o.gap_angular_velocity_sigma);
   v.field("max_angular_velocity", o.max_angular_velocity);
   v.field("max_specific_force", o.max_specific_force);
+  v.field("recover_after", o.recover_after);
   v.field("lost_after_s", o.lost_after_s);
 }
 
@@ -143,9 +172,6 @@ class Reader {
   explicit Reader(io::YamlBlock& block) : block_(block) {}
 
   void field(const char* key, double& value) {
-    if (block_.has(key)) value = block_.number(key);
-  }
-  void field(const char* key, std::optional<double>& value) {
     if (block_.has(key)) value = block_.number(key);
   }
   void field(const char* key, bool& value) {
@@ -170,6 +196,10 @@ class Reader {
     value = {wxyz[0], wxyz[1], wxyz[2], wxyz[3]};
     if (!(std::abs(value.norm() - 1) < 1e-2)) block_.fail(key, "norm " + to_text(value.norm()) + ", must be 1");
     if (std::abs(value.norm() - 1) > 1e-9) value.normalize();
+  }
+  template <class Value>
+  void field(const char* key, std::optional<Value>& value) {
+    if (block_.has(key)) field(key, value.emplace());
   }
   template <class Enum, std::size_t kNames>
   void choice(const char* key, Enum& value, const std::array<const char*, kNames>& names) {
@@ -213,8 +243,9 @@ class Writer {
   Writer(std::string& text, std::string indent) : text_(text), indent_(std::move(indent)) {}
 
   void field(const char* key, double value) { line(key, number(value)); }
-  void field(const char* key, const std::optional<double>& value) {
-    if (value) line(key, number(*value));
+  template <class Value>
+  void field(const char* key, const std::optional<Value>& value) {
+    if (value) field(key, *value);
   }
   void field(const char* key, bool value) { line(key, value ? "true" : "false"); }
   template <class Integer>

@@ -17,6 +17,8 @@
 //     ransac: true
 //   start:
 //     duration_s: 1
+//   moving_start:
+//     sampling: point                # interval-mean
 //   stand_still:
 //     window_s: 0.4
 #pragma once

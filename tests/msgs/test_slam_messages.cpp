@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <cstring>
+#include <regex>
+#include <sstream>
 
 #include "libloc/estimators/inertial_slam.hpp"
 #include "libloc/estimators/mono_slam.hpp"
@@ -42,7 +44,8 @@ class SlamMessages : public testing::Test {
   static SlamOptions options() {
     SlamOptions options;
     options.camera = test::slam_tracks(0).camera;
-    options.q_world_body.setIdentity();
+    options.map.max_linearity_index = 0.2;  // points of both kinds soon
+    options.q_world_body.emplace(Eigen::Quaterniond::Identity());
     return options;
   }
   // After 3 s, with points of both kinds.
@@ -303,7 +306,7 @@ TEST_F(SlamMessages, settings_come_back_from_their_file) {
   EXPECT_EQ(back.consistency, SlamConsistency::kFirstEstimate);
   EXPECT_EQ(back.precision, SlamPrecision::kFloat);
   EXPECT_TRUE(same_matrix(back.position, changed.position));
-  EXPECT_TRUE(same_matrix(back.q_world_body.coeffs(), changed.q_world_body.coeffs()));
+  EXPECT_TRUE(same_matrix(back.q_world_body->coeffs(), changed.q_world_body->coeffs()));
   ASSERT_EQ(back.landmarks.size(), 2U);
   EXPECT_EQ(back.landmarks[1].id, 9);
   EXPECT_EQ(back.landmarks[1].position, Eigen::Vector3d(4, 5, 6));
@@ -313,6 +316,40 @@ TEST_F(SlamMessages, settings_come_back_from_their_file) {
   EXPECT_EQ(back.start.heading, 0.7);
   EXPECT_EQ(back.stand_still.min_speed, 0.123);
   EXPECT_EQ(back.lost_after_s, 0.75);
+}
+
+// No field of the settings is left out: their names are looked up in the headers.
+TEST_F(SlamMessages, the_file_of_settings_has_every_field) {
+  SlamOptions all = options();
+  all.q_world_body.emplace(Eigen::Quaterniond::Identity());
+  all.start.heading = 1;
+  all.landmarks.emplace_back();
+  const std::string text = slam_options_text(all);
+  int found = 0;
+  const auto look = [&](const std::string& header, const std::string& name) {
+    const std::string source = test::read_file(std::filesystem::path(LOC_SOURCE_DIR) / "libloc" / header);
+    const auto begin = source.find("struct " + name + " {");
+    ASSERT_NE(begin, std::string::npos) << name;
+    std::istringstream lines(source.substr(begin, source.find("\n};", begin) - begin));
+    const std::regex field(R"(^  (?!using|static|///)[A-Za-z_:][A-Za-z0-9_:<>]* ([a-z_0-9]+)( = [^;]*|\{[^;]*\})?;.*)");
+    for (std::string line; std::getline(lines, line);) {
+      std::smatch match;
+      if (!std::regex_match(line, match, field) || match[1] == "camera") continue;
+      ++found;
+      const std::string key = match[1].str() + ":";
+      EXPECT_TRUE(text.find("\n" + key) != std::string::npos || text.find(" " + key) != std::string::npos)
+          << name << "." << match[1];
+    }
+  };
+  look("estimators/slam_options.hpp", "SlamOptions");
+  look("estimators/slam_options.hpp", "SlamMapOptions");
+  look("estimators/slam_options.hpp", "SlamAssociationOptions");
+  look("estimators/slam_options.hpp", "KnownLandmark");
+  look("estimators/slam_start.hpp", "SlamStartOptions");
+  look("estimators/fusion_start.hpp", "FusionStartOptions");
+  look("estimators/stand_still.hpp", "StandStillOptions");
+  look("sensors/imu_noise.hpp", "ImuNoise");
+  EXPECT_GT(found, 110);
 }
 
 TEST_F(SlamMessages, settings_that_are_wrong_are_named) {

@@ -56,7 +56,7 @@ SlamOptions slam_options(const SlamArguments& arguments, const std::string& meth
   SlamOptions options;
   const SlamMotion motion = method == kInertial ? SlamMotion::kInertial : SlamMotion::kConstantVelocity;
   options.motion = motion;
-  if (rig.imu) options.imu_noise = rig.imu->noise;
+  if (rig.imu && !rig.imu->noise_measured.empty()) options.imu_noise = rig.imu->noise;
   if (!arguments.config.empty()) {
     try {
       options = read_slam_options(arguments.config, options);

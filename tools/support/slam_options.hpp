@@ -24,8 +24,8 @@ struct SlamArguments {
 void add_slam_options(CLI::App& app, SlamArguments& arguments);
 bool is_slam(const std::string& method);
 
-/// @param method mono-slam or inertial-slam @param rig has the camera, and the noise of the IMU where it has one, which
-/// the file of settings may overrule
+/// @param method mono-slam or inertial-slam @param rig has the camera, and the noise of the IMU where it was measured,
+/// which the file of settings may overrule
 /// @throws UsageError for a rig without that camera, a file that says another motion; std::invalid_argument as
 /// SlamOptions::check.
 SlamOptions slam_options(const SlamArguments& arguments, const std::string& method, const Rig& rig);
