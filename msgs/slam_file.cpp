@@ -35,7 +35,7 @@ Eigen::Vector3d vector_from(const double* in) {
 }
 // Not normalised: what was saved comes back bit for bit.
 Eigen::Quaterniond quaternion_from(const double* in, const char* name) {
-  const Eigen::Quaterniond q(in[0], in[1], in[2], in[3]);
+  Eigen::Quaterniond q(in[0], in[1], in[2], in[3]);
   if (!(std::abs(q.norm() - 1) < 1e-6)) throw DataError(std::string(name) + ": norm " + to_text(q.norm()));
   return q;
 }

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <regex>
 #include <sstream>
 
@@ -240,6 +241,9 @@ TEST_F(SlamMessages, a_file_that_is_not_whole_is_refused) {
 TEST_F(SlamMessages, a_state_that_does_not_fit_is_refused) {
   const std::string whole = saved();
   const Bytes payload(whole.begin() + 20, whole.end());
+  for (std::size_t size = 0; size < payload.size(); size += size < 1000 ? 1 : 997) {
+    EXPECT_THROW(decode_message<slam_state_t>(std::span(payload).first(size)), DataError) << size;
+  }
   const auto refused = [&](const std::function<void(slam_state_t&)>& change, const std::string& part) {
     auto message = decode_message<slam_state_t>(payload);
     change(message);

@@ -23,6 +23,8 @@ FINGERPRINTS = {
     "map_points_t": 0xCFF528AC74639D5F,
     "odometry_t": 0x1157247BDAE507A3,
     "reference_t": 0x120581A61696AE36,
+    "slam_frame_t": 0x494BFFF77A74F59A,
+    "slam_state_t": 0x179AA043B2BA5005,
     "source_status_t": 0xD63AB9362BC56F14,
     "statistics_t": 0x2F2B80D43DC8BFD9,
     "tracks_t": 0x950A197598A1B7D6,

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
