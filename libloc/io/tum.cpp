@@ -57,10 +57,10 @@ TumFile read_tum(const std::filesystem::path& path) {
   return file;
 }
 
-void write_tum(const std::filesystem::path& path, const Trajectory& trajectory) {
+void write_tum(const std::filesystem::path& path, const Trajectory& trajectory, std::string_view frame) {
   trajectory.check(path.string());
   io::AtomicFile file(path);
-  file.stream() << "# timestamp [s] tx ty tz [m] qx qy qz qw, body to world\n";
+  file.stream() << "# timestamp [s] tx ty tz [m] qx qy qz qw, " << frame << " to world\n";
   for (std::size_t i = 0; i < trajectory.size(); ++i) {
     const Eigen::Vector3d& t = trajectory.poses[i].translation;
     const Eigen::Quaterniond& q = trajectory.poses[i].rotation;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string_view>
 
 #include "libloc/core/named_count.hpp"
 #include "libloc/geometry/trajectory.hpp"
@@ -21,7 +22,8 @@ struct TumFile {
 /// or infinity, a quaternion whose norm is farther from 1 than 1e-2 (others are normalised).
 TumFile read_tum(const std::filesystem::path& path);
 
+/// @param frame whose poses they are, for the heading: "body", "camera"
 /// @throws DataError when the file cannot be written or the trajectory is not one (Trajectory::check).
-void write_tum(const std::filesystem::path& path, const Trajectory& trajectory);
+void write_tum(const std::filesystem::path& path, const Trajectory& trajectory, std::string_view frame = "body");
 
 }  // namespace loc

@@ -311,7 +311,8 @@ void bind_tum(py::module_& m) {
       },
       py::arg("path"),
       "A trajectory in TUM's format, and what was read and skipped. DataError names file, line and value.");
-  m.def("write_tum", &loc::write_tum, py::arg("path"), py::arg("trajectory"), "Writes a trajectory in TUM's format.");
+  m.def("write_tum", &loc::write_tum, py::arg("path"), py::arg("trajectory"), py::arg("frame") = "body",
+        "Writes a trajectory in TUM's format; frame: whose poses they are, for the heading.");
 }
 
 }  // namespace

@@ -21,6 +21,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from types import FrameType
 from typing import TextIO
@@ -40,6 +41,17 @@ def _positive(text: str) -> float:
     if not (np.isfinite(value) and value > 0):
         raise argparse.ArgumentTypeError(f"{text}: must be a positive number")
     return value
+
+
+def _seconds(text: str) -> int:
+    """Seconds as int64 nanoseconds, exactly."""
+    try:
+        time_ns = int((Decimal(text) * 1_000_000_000).to_integral_value())
+    except (InvalidOperation, ValueError, OverflowError):
+        raise argparse.ArgumentTypeError(f"{text}: must be seconds") from None
+    if abs(time_ns) >= 2**62:
+        raise argparse.ArgumentTypeError(f"{text}: is out of range")
+    return time_ns
 
 
 def _index(text: str) -> int:
@@ -84,6 +96,12 @@ def make_parser() -> argparse.ArgumentParser:
         type=_positive,
         metavar="HZ",
         help="frames a second of a tracks file (default: rate_hz of the camera in --config)",
+    )
+    parser.add_argument(
+        "--start-time",
+        type=_seconds,
+        metavar="S",
+        help="of frame 0 of a tracks file, on the clock of --reference (default: 0)",
     )
     group = parser.add_argument_group("truth")
     group.add_argument(
@@ -221,6 +239,9 @@ def main(arguments: list[str] | None = None) -> int:
         return EXIT_INTERRUPTED
     if len(result.run) == 0:
         print("loc-slam: no frame could be used", file=sys.stderr)
+        return EXIT_FAILED
+    if options.reference and result.truth_failure:
+        print(f"loc-slam: --reference {options.reference}: {result.truth_failure}", file=sys.stderr)
         return EXIT_FAILED
     return EXIT_OK
 

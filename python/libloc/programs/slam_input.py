@@ -50,7 +50,14 @@ def _read_tracks(path: Path, options: argparse.Namespace, rate_hz: float) -> Sla
             f"{path}: a tracks file has no times: give --rate-hz, or rate_hz of the camera in --config"
         )
     frame, feature, pixel_px, counts = libloc.read_tracks(path)
-    features = libloc.features_of_tracks(frame, feature, pixel_px, rate_hz=rate_hz, camera=options.camera)
+    features = libloc.features_of_tracks(
+        frame,
+        feature,
+        pixel_px,
+        rate_hz=rate_hz,
+        start_time_ns=options.start_time or 0,
+        camera=options.camera,
+    )
     return SlamInput(path, "tracks", features, libloc.Rig(), None, counts)
 
 
@@ -81,8 +88,10 @@ def read_input(options: argparse.Namespace) -> SlamInput:
     if form == "tum" and _is_tracks_file(path):
         given = _read_tracks(path, options, options.rate_hz or rig.cameras[options.camera].rate_hz)
     else:
-        if options.rate_hz is not None:
-            raise DataError(f"{path}: is a recording with times of its own, --rate-hz is for tracks files")
+        for name in ("rate_hz", "start_time"):
+            if getattr(options, name) is not None:
+                option = f"--{name.replace('_', '-')}"
+                raise DataError(f"{path}: is a recording with times of its own, {option} is for tracks files")
         recording = libloc.read_recording(path)
         reference = None if options.reference else _own_reference(path, form, recording)
         given = SlamInput(path, form, recording, rig, reference, recording.counts)

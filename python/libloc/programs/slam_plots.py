@@ -31,6 +31,13 @@ def _figure(width: float = 11, height: float = 5) -> Figure:
     return figure
 
 
+def _legend(axes: Axes) -> None:
+    """Above the axes, where it hides nothing."""
+    axes.legend(
+        loc="lower right", bbox_to_anchor=(1, 1), ncols=5, fontsize=9, frameon=False, borderaxespad=0.2
+    )
+
+
 class _Scene:
     """Path, truth and map in the frame in which they are shown."""
 
@@ -72,7 +79,7 @@ class _Scene:
 
     def map_label(self) -> str:
         rest = f"; {self.left_out} known less well are not shown" if self.left_out else ""
-        return f"map, {len(self.points)} points with 1 sigma{rest}"
+        return f"map at the end, {len(self.points)} points with 1 sigma{rest}"
 
 
 def _ellipses(axes: Axes, centres: NDArray[np.float64], covariances: NDArray[np.float64]) -> None:
@@ -137,7 +144,7 @@ def plot_top(result: SlamResult, path: Path) -> None:
 def plot_space(result: SlamResult, path: Path) -> None:
     """Path and map in three dimensions; a point's bar is 1 sigma along its worst direction."""
     scene = _Scene(result)
-    figure = _figure(10, 8)
+    figure = _figure(10, 7)
     axes: Any = figure.add_subplot(projection="3d")
     if scene.reference is not None:
         axes.plot(*scene.reference.T, color=_REFERENCE, lw=3, label="truth")
@@ -156,7 +163,9 @@ def plot_space(result: SlamResult, path: Path) -> None:
         getattr(axes, f"set_{name}lim")(centre[k] - 0.5 * spans[k], centre[k] + 0.5 * spans[k])
         getattr(axes, f"set_{name}label")(f"{name} [{scene.unit}]")
         getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(max(2, round(6 * spans[k] / scene.size))))
-    axes.set_box_aspect(spans)
+    axes.set_box_aspect(spans, zoom=1.15)
+    for artist in (*axes.lines, *axes.collections):
+        artist.set_clip_on(False)  # the box is turned, and reaches beyond its axes
     figure.legend(loc="outside lower center", ncols=3, fontsize=9)
     figure.suptitle(_title(result))
     figure.savefig(path, dpi=110)
@@ -200,7 +209,7 @@ def plot_reprojection(result: SlamResult, path: Path) -> None:
     else:
         axes.set_ylim(0, None)
     axes.set(xlabel="time since the first frame [s]", ylabel="rms of |measured - predicted| in a frame [px]")
-    axes.legend(loc="upper right")
+    _legend(axes)
     axes.grid(alpha=0.3)
     figure.suptitle("reprojection error")
     figure.savefig(path, dpi=110)
@@ -221,7 +230,7 @@ def plot_features(result: SlamResult, path: Path) -> None:
     rejected = run.counts["rejected"]
     upper.plot(t, rejected, color="tab:red", lw=0.8, label=f"not believed ({rejected.sum()} in all)")
     upper.set(ylabel="features", ylim=(0, None))
-    upper.legend(loc="upper right", ncols=2, fontsize=9)
+    _legend(upper)
     for name, label, colour in (
         ("added", "added", _ESTIMATE),
         ("converted", "became XYZ", _OTHER),
@@ -230,13 +239,13 @@ def plot_features(result: SlamResult, path: Path) -> None:
         values = np.cumsum(run.counts[name])
         middle.plot(t, values, color=colour, lw=1, label=f"{label}, {values[-1]}")
     middle.set(ylabel="since the start", ylim=(0, None))
-    middle.legend(loc="upper left", fontsize=9)
+    _legend(middle)
     ms = 1e3 * run.time_spent_s
     lower.plot(t, ms, color=_ESTIMATE, lw=0.6, label=f"mean {ms.mean():.2f} ms")
     lower.set(
         xlabel="time since the first frame [s]", ylabel="filter [ms]", ylim=(0, 1.3 * np.percentile(ms, 99.5))
     )
-    lower.legend(loc="upper right", fontsize=9)
+    _legend(lower)
     for axes in (upper, middle, lower):
         axes.grid(alpha=0.3)
     figure.suptitle("features")
@@ -266,7 +275,7 @@ def plot_nis(result: SlamResult, path: Path) -> None:
     finite = ratio[np.isfinite(ratio)]
     top = max(2.0, 1.2 * float(np.percentile(finite, 99))) if len(finite) else 2.0
     axes.set(xlabel="time since the first frame [s]", ylabel="NIS per dimension", ylim=(0, top))
-    axes.legend(loc="upper right", ncols=3, fontsize=9)
+    _legend(axes)
     axes.grid(alpha=0.3)
     inside = np.mean((finite > bounds[used, 0]) & (finite < bounds[used, 1])) if len(finite) else np.nan
     figure.suptitle(
@@ -290,13 +299,13 @@ def plot_error(result: SlamResult, path: Path) -> None:
         reach = 1.3 * max(float(np.abs(error[:, k]).max()), 1e-6)
         reach = max(reach, min(1.1 * float(band.max()), 4 * reach))  # a wide band must not flatten the error
         axes.set(ylabel=f"{_AXES[k]} [m]", ylim=(-reach, reach))
-    panels[0].legend(loc="upper right", ncols=2, fontsize=9)
+    _legend(panels[0])
     distance = truth.absolute.translation_m
     panels[3].plot(t, _with_holes(t, distance), color=_ESTIMATE, lw=0.9, label="distance from the true place")
     running = np.sqrt(np.cumsum(distance**2) / np.arange(1, len(distance) + 1))
     panels[3].plot(t, running, color="k", lw=1.2, label="rms so far")
     panels[3].set(xlabel="time since the first frame [s]", ylabel="error [m]", ylim=(0, None))
-    panels[3].legend(loc="upper right", ncols=2, fontsize=9)
+    _legend(panels[3])
     for axes in panels:
         axes.grid(alpha=0.3)
     figure.suptitle("error of the place, " + _title(result))

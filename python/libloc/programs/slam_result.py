@@ -223,7 +223,7 @@ def text_of(out: dict[str, Any]) -> str:
         if t["share_within_3_sigma"] is not None:
             line(
                 "",
-                f"{100 * t['share_within_3_sigma']:.1f} % of the errors are within 3 sigma (99.7 % is right)",
+                f"{100 * t['share_within_3_sigma']:.1f} % of the aligned errors are within 3 sigma",
             )
     elif "truth_failure" in out:
         line("truth", f"not compared: {out['truth_failure']}")
@@ -318,7 +318,7 @@ def write_trajectory(run: SlamRun, pose: str, path: Path) -> None:
         trajectory = libloc.Trajectory(
             run.time_ns[rows], run.q_world_camera_wxyz[rows], run.camera_position[rows]
         )
-    libloc.write_tum(path, trajectory)
+    libloc.write_tum(path, trajectory, pose)
 
 
 def write(result: SlamResult, out: dict[str, Any], pose: str, pictures: bool, folder: Path) -> list[Path]:
