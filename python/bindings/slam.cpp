@@ -1,4 +1,4 @@
-// estimators/mono_slam: step by step, and a whole recording in one call.
+// estimators/mono_slam and inertial_slam: step by step, and a whole recording in one call.
 #include <pybind11/stl.h>
 
 #include <algorithm>
@@ -13,6 +13,7 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "libloc/estimators/inertial_slam.hpp"
 #include "libloc/estimators/mono_slam.hpp"
 #include "recording.hpp"
 #include "slam_results.hpp"
@@ -21,6 +22,7 @@ namespace locpy {
 namespace {
 
 using loc::FeaturesMeasurement;
+using loc::InertialSlam;
 using loc::MonoSlam;
 using loc::SlamMapPoint;
 using loc::SlamOptions;
@@ -97,13 +99,10 @@ SlamInput input_of(const FrameArguments& frames, const ImuArguments& imu, const 
     one_or_many(in.sigmas->size(), "sigma_px");
   }
   if (imu.time_ns) {
-    if (!imu.gyro || !imu.force) throw py::value_error("imu_time_ns is given without gyro or force");
     in.imu_time_ns = times_view(*imu.time_ns, "imu_time_ns");
     const auto samples = static_cast<py::ssize_t>(in.imu_time_ns.size());
     in.gyro = rows_view<3>(*imu.gyro, "gyro", samples, "imu_time_ns").data();
     in.force = rows_view<3>(*imu.force, "force", samples, "imu_time_ns").data();
-  } else if (imu.gyro || imu.force) {
-    throw py::value_error("gyro or force is given without imu_time_ns");
   }
   return in;
 }
@@ -134,6 +133,12 @@ class Progress {
   std::chrono::steady_clock::time_point last_;
 };
 
+/// A frame waits for the IMU: one measurement may complete none or several.
+template <class Slam>
+constexpr bool kHasFrames = requires(const Slam& slam) {
+  slam.frames();
+};
+
 /// An estimator, and a flag that is set while a call works without the GIL.
 template <class Slam>
 class PySlam {
@@ -149,8 +154,12 @@ class PySlam {
 
  private:
   void step(const loc::Measurement& measurement, SlamColumns& columns) {
-    if (!slam_.process(measurement)) return;
-    columns.add(slam_.frame(), slam_.estimate());
+    const bool has_estimate = slam_.process(measurement);
+    if constexpr (kHasFrames<Slam>) {
+      for (const loc::SlamFrame& frame : slam_.frames()) columns.add(frame, frame.estimate);
+    } else if (has_estimate) {
+      columns.add(slam_.frame(), slam_.estimate());
+    }
   }
 
   Slam slam_;
@@ -210,7 +219,9 @@ constexpr const char* kRunDoc =
     "A whole recording in one call, without the GIL and without copies of the input; the same numbers as step by step, "
     "and the next call goes on from here.\n\n"
     "Frame i at time_ns[i] has the features first[i]:first[i + 1] of id (M,) and pixel_px (M, 2): the fields of "
-    "Recording.features. sigma_px and camera: one, or one for each frame; by default those of the options. "
+    "Recording.features. sigma_px and camera: one, or one for each frame; by default those of the options. With an "
+    "IMU: "
+    "imu_time_ns int64 (S,), gyro (S, 3) [rad/s], force (S, 3) [m/s^2], at rest +9.81 upwards. "
     "progress(frames done, frames in all) is called a few times in a second; when it returns False the run ends, with "
     "what there is. KeyboardInterrupt leaves the estimator where it was then.";
 
@@ -241,8 +252,6 @@ py::class_<PySlam<Slam>> bind_estimator(py::module_& m, const char* name, const 
           "One frame: id int64 (M,), pixel_px (M, 2), deviation of one coordinate (NaN: that of the options).")
       .def("estimate", [](P& self) { return self.idle().estimate(); })
       .def(
-          "frame", [](P& self) { return self.idle().frame(); }, "SlamFrame: the last one that was used, a copy.")
-      .def(
           "map", [](P& self) { return arrays_of(self.idle().map()); }, "SlamMapArrays")
       .def(
           "counts", [](P& self) { return as_map(self.idle().counts()); },
@@ -257,6 +266,18 @@ py::class_<PySlam<Slam>> bind_estimator(py::module_& m, const char* name, const 
       .def_property_readonly("running", [](P& self) { return self.idle().running(); })
       .def_property_readonly(
           "options", [](P& self) { return self.idle().options(); }, "A copy.");
+  if constexpr (kHasFrames<Slam>) {
+    c.def(
+        "frames",
+        [](P& self) {
+          const auto frames = self.idle().frames();
+          return std::vector<loc::SlamFrame>(frames.begin(), frames.end());
+        },
+        "[SlamFrame]: those that the last process() has completed, usually none or one; at the start all that waited.");
+  } else {
+    c.def(
+        "frame", [](P& self) { return self.idle().frame(); }, "SlamFrame: the last one that was used, a copy.");
+  }
   return c;
 }
 
@@ -280,6 +301,24 @@ void bind_slam(py::module_& m) {
           py::arg("time_ns"), py::arg("first"), py::arg("id"), py::arg("pixel_px"), py::kw_only(),
           py::arg("camera") = py::none(), py::arg("sigma_px") = py::none(), py::arg("progress") = py::none(),
           py::arg("with_covariance") = true, py::arg("with_features") = false, kRunDoc);
+  bind_estimator<InertialSlam>(m, "InertialSlam",
+                               "SLAM with one camera and an IMU: metres, and a world with z up. It starts from rest or "
+                               "in motion; the first estimate comes late, for all frames. Not observable: place and "
+                               "heading of the world.")
+      .def(
+          "run",
+          [](PySlam<InertialSlam>& self, const TimeArray& time_ns, const TimeArray& first, const TimeArray& id,
+             const FloatArray& pixel_px, const TimeArray& imu_time_ns, const FloatArray& gyro, const FloatArray& force,
+             const std::optional<ArrayLike>& camera, const std::optional<ArrayLike>& sigma_px,
+             std::optional<py::function> progress, bool with_covariance, bool with_features) {
+            const SlamInput in = input_of({time_ns, first, id, pixel_px, camera, sigma_px}, {imu_time_ns, gyro, force},
+                                          self.idle().options());
+            return self.run(in, std::move(progress), with_covariance, with_features);
+          },
+          py::arg("time_ns"), py::arg("first"), py::arg("id"), py::arg("pixel_px"), py::arg("imu_time_ns"),
+          py::arg("gyro"), py::arg("force"), py::kw_only(), py::arg("camera") = py::none(),
+          py::arg("sigma_px") = py::none(), py::arg("progress") = py::none(), py::arg("with_covariance") = true,
+          py::arg("with_features") = false, kRunDoc);
 }
 
 }  // namespace locpy

@@ -80,6 +80,44 @@ void bind_association_options(py::module_& m) {
       .def("check", &O::check, "ValueError names a field that is out of range.");
 }
 
+void bind_inertial_options(py::module_& m) {
+  using R = loc::StandStillOptions;
+  py::class_<R>(m, "StandStillOptions", "When an IMU is at rest; every field is a keyword of the constructor.")
+      .def(py::init([](const py::kwargs& fields) { return with_fields<R>("StandStillOptions", fields); }),
+           "TypeError for an unknown field, ValueError for a value out of range.")
+      .def_readwrite("window_s", &R::window_s, "[s]")
+      .def_readwrite("min_duration_s", &R::min_duration_s, "Calm for this long is rest; the window counts [s].")
+      .def_readwrite("threshold", &R::threshold, "Of the test; 6 is white noise of the densities alone.")
+      .def_readwrite("force_sigma_floor", &R::force_sigma_floor, "Of one sample: quantisation, a desk [m/s^2].")
+      .def_readwrite("rate_sigma_floor", &R::rate_sigma_floor, "The same [rad/s].")
+      .def_readwrite("max_angular_velocity", &R::max_angular_velocity, "Mean rate less the bias [rad/s].")
+      .def_readwrite("max_force_error", &R::max_force_error, "Length of the mean force less gravity [m/s^2].")
+      .def_readwrite("max_force_change", &R::max_force_change, "Of the mean force since this rest began [m/s^2].")
+      .def_readwrite("max_rate_change", &R::max_rate_change, "Of the mean rate since this rest began [rad/s].")
+      .def_readwrite("min_speed", &R::min_speed, "A speed that is surely higher says: not at rest [m/s].")
+      .def("check", &R::check, "ValueError names a field that is out of range.");
+  using S = loc::FusionStartOptions;
+  py::class_<S>(m, "FusionStartOptions",
+                "Start of an inertial filter from its first second; every field is a keyword of the constructor.")
+      .def(py::init([](const py::kwargs& fields) { return with_fields<S>("FusionStartOptions", fields); }),
+           "TypeError for an unknown field, ValueError for a value out of range.")
+      .def_readwrite("duration_s", &S::duration_s, "So much of the data is looked at [s].")
+      .def_readwrite("max_gap_s", &S::max_gap_s, "A longer step begins anew [s].")
+      .def_readwrite("moving_acceleration_sigma", &S::moving_acceleration_sigma,
+                     "Of the mean over duration_s, when not at rest [m/s^2].")
+      .def_readwrite("moving_velocity_sigma", &S::moving_velocity_sigma, "[m/s]")
+      .def_readwrite("still_velocity_sigma", &S::still_velocity_sigma, "[m/s]")
+      .def_readwrite("tilt_sigma_floor", &S::tilt_sigma_floor, "[rad]")
+      .def_readwrite("still_bias_sigma_floor", &S::still_bias_sigma_floor,
+                     "Of the gyroscope's bias from a rest: earth rate, swaying [rad/s].")
+      .def_readwrite("position_sigma", &S::position_sigma, "The start is the origin [m].")
+      .def_readwrite("heading", &S::heading, "Of the body, from east to north [rad]; None: not known.")
+      .def_readwrite("heading_sigma", &S::heading_sigma, "Of the one that is given [rad].")
+      .def_readwrite("magnetic_declination", &S::magnetic_declination, "East of north positive [rad].")
+      .def_readwrite("magnetic_heading_sigma", &S::magnetic_heading_sigma, "Iron nearby, declination [rad].")
+      .def("check", &S::check, "ValueError names a field that is out of range.");
+}
+
 void bind_landmark(py::module_& m) {
   py::class_<KnownLandmark> c(m, "KnownLandmark",
                               "A point whose place in world is known: it gives the scale and ties the world.");
@@ -114,6 +152,7 @@ void bind_slam_options_struct(py::module_& m) {
       .def_readwrite("motion", &O::motion)
       .def_readwrite("consistency", &O::consistency)
       .def_readwrite("precision", &O::precision)
+      .def_readwrite("max_iterations", &O::max_iterations, "Of an update that is far from linear; 1: plain EKF.")
       .def_readwrite("camera", &O::camera,
                      "CameraCalibration: K with distortion, pose in body, clock. Without an IMU body is what moves "
                      "smoothly; T_body_camera may be the identity.")
@@ -155,6 +194,22 @@ void bind_slam_options_struct(py::module_& m) {
       .def_readwrite("association", &O::association, "SlamAssociationOptions")
       .def_readwrite("max_gap_s", &O::max_gap_s,
                      "Camera alone: after a longer pause between frames the motion is unknown [s].")
+      .def_readwrite("start", &O::start, "With an IMU: FusionStartOptions, start from rest.")
+      .def_readwrite("stand_still", &O::stand_still, "With an IMU: StandStillOptions, when the body rests.")
+      .def_readwrite("zero_velocity", &O::zero_velocity, "The velocity is zero while IMU and picture stand still.")
+      .def_readwrite("zero_velocity_sigma", &O::zero_velocity_sigma, "[m/s]")
+      .def_readwrite("zero_rate_sigma_floor", &O::zero_rate_sigma_floor,
+                     "What a body at rest may turn, earth rate included [rad/s].")
+      .def_readwrite("still_picture_px", &O::still_picture_px,
+                     "Features move less from frame to frame: the picture stands still [px].")
+      .def_readwrite("max_imu_step_s", &O::max_imu_step_s, "A longer step is a gap: bridged with more noise [s].")
+      .def_readwrite("max_imu_bridge_s", &O::max_imu_bridge_s, "Beyond it a new start [s].")
+      .def_readwrite("gap_acceleration_sigma", &O::gap_acceleration_sigma, "What the body may do in a gap [m/s^2].")
+      .def_readwrite("gap_angular_velocity_sigma", &O::gap_angular_velocity_sigma, "The same [rad/s].")
+      .def_readwrite("max_angular_velocity", &O::max_angular_velocity, "A sample with more is skipped [rad/s].")
+      .def_readwrite("max_specific_force", &O::max_specific_force, "A sample with more is skipped [m/s^2].")
+      .def_readwrite("lost_after_s", &O::lost_after_s,
+                     "Without a frame of enough features: estimates say so (FEW_FEATURES) [s].")
       .def("check", &O::check, "ValueError names a field that is out of range.");
 }
 
@@ -218,6 +273,7 @@ void bind_slam_options(py::module_& m) {
   bind_enumerations(m);
   bind_map_options(m);
   bind_association_options(m);
+  bind_inertial_options(m);
   bind_landmark(m);
   bind_slam_options_struct(m);
   bind_inverse_depth(m);

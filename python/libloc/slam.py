@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from libloc._core import (
     FeaturesArrays,
+    InertialSlam,
     MeasurementSource,
     MonoSlam,
     Recording,
@@ -106,16 +107,20 @@ def run_slam(
     features = recording.features if isinstance(recording, Recording) else recording
     if not np.any(np.asarray(features.camera) == options.camera_index):
         raise ValueError(f"the recording has no features of camera {options.camera_index}")
-    if options.motion != SlamMotion.CONSTANT_VELOCITY:
-        raise ValueError(f"options.motion = {options.motion!r}: this form of run_slam has no IMU")
-    return MonoSlam(options).run(
-        features.times_ns,
-        features.first,
-        features.id,
-        features.pixel_px,
-        camera=features.camera,
-        sigma_px=features.sigma_px,
-        progress=progress,
-        with_covariance=with_covariance,
-        with_features=with_features,
-    )
+    frames = (features.times_ns, features.first, features.id, features.pixel_px)
+    settings = {
+        "camera": features.camera,
+        "sigma_px": features.sigma_px,
+        "progress": progress,
+        "with_covariance": with_covariance,
+        "with_features": with_features,
+    }
+    if options.motion == SlamMotion.CONSTANT_VELOCITY:
+        return MonoSlam(options).run(*frames, **settings)
+    imu = recording.imu if isinstance(recording, Recording) else None
+    if imu is None or len(imu.times_ns) == 0:
+        raise ValueError("the recording has no IMU samples, which InertialSlam needs")
+    gyro, force = imu.angular_velocity, imu.specific_force
+    if rig is not None and rig.imu is not None:
+        gyro, force = _applied(rig.imu.gyroscope, gyro), _applied(rig.imu.accelerometer, force)
+    return InertialSlam(options).run(*frames, imu.times_ns, gyro, force, **settings)

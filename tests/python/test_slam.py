@@ -321,8 +321,12 @@ def test_snapshot_and_reset():
 
 
 def test_every_option_is_there():
-    header = (CHECKOUT / "libloc/estimators/slam_options.hpp").read_text()
-    for name in ("SlamMapOptions", "SlamAssociationOptions", "SlamOptions", "KnownLandmark"):
+    folder = CHECKOUT / "libloc/estimators"
+    header = "".join(
+        (folder / f"{x}.hpp").read_text() for x in ("slam_options", "fusion_start", "stand_still")
+    )
+    for name in ("SlamMapOptions", "SlamAssociationOptions", "SlamOptions", "KnownLandmark",
+                 "FusionStartOptions", "StandStillOptions"):  # fmt: skip
         body = re.search(rf"struct {name} \{{(.*?)\n\}};", header, re.S)[1]
         fields = re.findall(r"^  [\w:]+(?:<\w+>)? (\w+)(?: =[^;]*|\{[^}]*\})?;", body, re.M)
         assert len(fields) >= 3, name

@@ -4,10 +4,11 @@ INPUT is a tracks file (rows `frame feature dimension value`) or a recording wit
 loc-simulate's folder or log); its content tells. --config is the rig file with the camera's calibration.
 
 mono-slam needs nothing but the camera: lengths are in a unit of their own then, and the world is where the
-camera began, which looks along x with z up. --output gets the trajectory (TUM, see --pose), the map (PLY),
-a CSV with a line for each frame, summary.txt and summary.json, and pictures. Where there is truth
-(--reference, or in the recording) the trajectory is compared with it after an alignment: similarity for a
-camera alone, rigid where lengths are metres.
+camera began, which looks along x with z up. inertial-slam takes the recording's IMU as well: metres, and a
+world with z up. --output gets the trajectory (TUM, see --pose), the map (PLY), a CSV with a line for each
+frame, summary.txt and summary.json, and pictures. Where there is truth (--reference, or in the recording) the
+trajectory is compared with it after an alignment: similarity for a camera alone, rigid where lengths are
+metres.
 
 Exit codes: 0 done, 1 the data cannot be used (the message says why), 2 wrong options, 130 interrupted: what
 there was by then is written.
@@ -187,6 +188,11 @@ def run(options: argparse.Namespace) -> SlamResult:
             file=sys.stderr,
         )
     slam = slam_options(options, given.rig)
+    if slam.motion == libloc.SlamMotion.INERTIAL and given.rig.imu is None:
+        print(
+            f"loc-slam: warning: {options.config}: no imu in it: its noise is a guess, it is not calibrated",
+            file=sys.stderr,
+        )
     began = time.monotonic()
     with _interrupt() as interrupted, _progress() as progress:
 

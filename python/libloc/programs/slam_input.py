@@ -15,7 +15,7 @@ from libloc import DataError, SlamMotion, SlamOptions
 from libloc.programs.evaluate_input import Poses, normalised, read_reference
 
 # The methods as loc-estimator calls them.
-METHODS = {"mono-slam": SlamMotion.CONSTANT_VELOCITY}
+METHODS = {"mono-slam": SlamMotion.CONSTANT_VELOCITY, "inertial-slam": SlamMotion.INERTIAL}
 
 
 @dataclass
@@ -78,6 +78,10 @@ def _own_reference(path: Path, form: str, recording: libloc.Recording) -> Poses 
     )
 
 
+def _has_imu(recording: libloc.Recording | libloc.FrameFeatures) -> bool:
+    return isinstance(recording, libloc.Recording) and len(recording.imu.times_ns) > 0
+
+
 def read_input(options: argparse.Namespace) -> SlamInput:
     """Raises DataError naming file, line, field and value."""
     path: Path = options.input
@@ -102,6 +106,8 @@ def read_input(options: argparse.Namespace) -> SlamInput:
         if isinstance(given.recording, libloc.Recording) and given.recording.images:
             held += f", and {given.recording.images} pictures, which are not searched for features"
         raise DataError(f"{path}: no features of camera {options.camera} in it; it holds {held}")
+    if options.method == "inertial-slam" and not _has_imu(given.recording):
+        raise DataError(f"{path}: no IMU samples in it, which {options.method} needs")
     if options.reference:
         given.reference = read_reference(options.reference)
         if not given.reference.has_position().any():

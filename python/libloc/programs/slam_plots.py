@@ -110,9 +110,10 @@ def plot_top(result: SlamResult, path: Path) -> None:
     """Path and map from above, and from the side."""
     scene = _Scene(result)
     spans = np.maximum(scene.high - scene.low, 0.05 * scene.size)
-    width = 10.0
-    figure = _figure(width, float(np.clip(width * (spans[1] + spans[2]) / spans[0] + 1.5, 6, 14)))
-    panels = figure.subplots(2, 1, sharex=True, height_ratios=(spans[1], spans[2]))
+    # Panels as high as their shape asks for, within what is pleasant to look at.
+    heights = np.clip(10 * spans[1:] / spans[0], 1.8, 8.0)
+    figure = _figure(10, float(heights.sum()) + 1.8)
+    panels = figure.subplots(2, 1, sharex=True, height_ratios=heights)
     for axes, (h, v) in zip(panels, ((0, 1), (0, 2)), strict=True):
         if scene.reference is not None:
             axes.plot(scene.reference[:, h], scene.reference[:, v], color=_REFERENCE, lw=3, label="truth")
@@ -166,6 +167,7 @@ def plot_space(result: SlamResult, path: Path) -> None:
     axes.set_box_aspect(spans, zoom=1.15)
     for artist in (*axes.lines, *axes.collections):
         artist.set_clip_on(False)  # the box is turned, and reaches beyond its axes
+        artist.set_in_layout(False)
     figure.legend(loc="outside lower center", ncols=3, fontsize=9)
     figure.suptitle(_title(result))
     figure.savefig(path, dpi=110)
@@ -312,6 +314,33 @@ def plot_error(result: SlamResult, path: Path) -> None:
     figure.savefig(path, dpi=110)
 
 
+def plot_inertial(result: SlamResult, path: Path) -> None:
+    """Velocity and biases over time with their 3 sigma."""
+    run, t = result.run, _seconds(result)
+    figure = _figure(11, 8)
+    panels = figure.subplots(3, 1, sharex=True)
+    sigma = np.sqrt(np.maximum(np.diagonal(run.covariance, axis1=1, axis2=2), 0))
+    for axes, name, first, unit in (
+        (panels[0], "velocity", 6, "m/s"),
+        (panels[1], "gyroscope_bias", 9, "rad/s"),
+        (panels[2], "accelerometer_bias", 12, "m/s$^2$"),
+    ):
+        values = getattr(run, name)
+        for k, colour in enumerate((_ESTIMATE, _MAP, _OTHER)):
+            band = 3 * sigma[:, first + k]
+            axes.fill_between(t, values[:, k] - band, values[:, k] + band, color=colour, alpha=0.15, lw=0)
+            axes.plot(t, _with_holes(t, values[:, k]), color=colour, lw=1, label=_AXES[k])
+        # What is wide at the start must not flatten all that follows.
+        late = slice(len(t) // 10, None)
+        reach = np.nanmax(np.abs(values[late]) + 3 * sigma[late, first : first + 3])
+        axes.set(ylabel=f"{name.replace('_', ' ')} [{unit}]", ylim=(-1.1 * reach, 1.1 * reach))
+        axes.grid(alpha=0.3)
+    _legend(panels[0])
+    panels[2].set_xlabel("time since the first frame [s]")
+    figure.suptitle("velocity in world and biases of the IMU, with 3 sigma")
+    figure.savefig(path, dpi=110)
+
+
 def write_pictures(result: SlamResult, folder: Path) -> list[Path]:
     """The paths of what was drawn."""
     pictures = {
@@ -321,6 +350,8 @@ def write_pictures(result: SlamResult, folder: Path) -> list[Path]:
         "features.png": plot_features,
         "nis.png": plot_nis,
     }
+    if np.isfinite(result.run.gyroscope_bias).any():
+        pictures["inertial.png"] = plot_inertial
     if result.truth is not None:
         pictures["error.png"] = plot_error
     for name, draw in pictures.items():

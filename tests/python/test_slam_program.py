@@ -1,0 +1,264 @@
+"""loc-slam as a user runs it, on simulated recordings."""
+
+import io
+import json
+import signal
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import loc
+import numpy as np
+import pytest
+from libloc.lcm_log import LogWriter
+from libloc.programs import slam
+from libloc.programs.evaluate_input import read_estimate
+
+import libloc
+
+START_NS = 1_700_000_000_000_000_000
+FRAMES = 160
+
+
+class Case:
+    """A walk in three forms, with its rig and its truth."""
+
+    def __init__(self, folder: Path) -> None:
+        scenario = libloc.Scenario("circle", duration_s=8, parameters={"camera.max_features": 60})
+        for stream in ("gps", "magnetometer", "odometry"):
+            scenario.set(f"streams.{stream}", False)
+        self.recording = libloc.simulate(scenario, 5).recording
+        self.rig = folder / "rig.yaml"
+        libloc.write_rig(self.rig, scenario.rig())
+        features, truth = self.recording.features, self.recording.reference
+        frame = np.repeat(np.arange(len(features.times_ns)), np.diff(features.first))
+        self.tracks = folder / "walk.tracks"
+        libloc.write_tracks(self.tracks, frame, features.id, features.pixel_px)
+        self.truth = folder / "truth.tum"
+        libloc.write_tum(
+            self.truth, libloc.Trajectory(truth.times_ns, truth.q_world_body_wxyz, truth.position)
+        )
+        self.log = folder / "walk.lcm"
+        with LogWriter(self.log) as log:
+            for i, time_ns in enumerate(int(t) for t in features.times_ns):
+                m = loc.tracks_t()
+                rows = slice(features.first[i], features.first[i + 1])
+                m.time_ns, m.host_time_ns, m.sequence, m.sigma_px = time_ns, time_ns, i, 0.5
+                m.feature_id = features.id[rows].tolist()
+                m.u_px, m.v_px = features.pixel_px[rows].T.tolist()
+                m.size = len(m.feature_id)
+                log.write("LOC_TRACKS", m, time_ns // 1000)
+                r = loc.reference_t()
+                k = int(np.searchsorted(truth.times_ns, time_ns))
+                r.time_ns, r.host_time_ns, r.sequence, r.score = time_ns, time_ns, i, True
+                r.q_world_body_wxyz = truth.q_world_body_wxyz[k].tolist()
+                r.position, r.velocity = truth.position[k].tolist(), truth.velocity[k].tolist()
+                log.write("LOC_REFERENCE", r, time_ns // 1000)
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory) -> Case:
+    return Case(tmp_path_factory.mktemp("walk"))
+
+
+def call(*arguments) -> int:
+    return slam.main([str(a) for a in arguments])
+
+
+def table(path: Path) -> dict[str, np.ndarray]:
+    names, *rows = [line.split(",") for line in path.read_text().splitlines()]
+    return {name: np.array([float(row[k] or "nan") for row in rows]) for k, name in enumerate(names)}
+
+
+def test_all_files_from_a_tracks_file(case, tmp_path, capsys):
+    out = tmp_path / "out"
+    arguments = [case.tracks, "--config", case.rig, "--sigma-px", 0.5, "--start-time", START_NS // 10**9]
+    assert call(*arguments, "--reference", case.truth, "--output", out) == 0
+    text = capsys.readouterr().out
+    assert f"frames         {FRAMES} used of {FRAMES}" in text
+    assert "units of its own: one camera cannot tell metres" in text
+    names = ["summary.json", "summary.txt", "trajectory.tum", "frames.csv", "map.ply", "trajectory.png",
+             "trajectory_3d.png", "reprojection.png", "features.png", "nis.png", "error.png"]  # fmt: skip
+    assert sorted(p.name for p in out.iterdir()) == sorted(names)
+    for name in names:
+        assert f"written: {out / name}" in text
+        assert (out / name).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n" or not name.endswith(".png")
+    assert (out / "summary.txt").read_text() in text
+
+    # The same run from Python: every file holds it.
+    options = libloc.SlamOptions(
+        camera=libloc.read_rig(case.rig).cameras[0], sigma_px=0.5, override_sigma=True
+    )
+    # The rig's camera looks along body's x, and so does the program's world.
+    options.q_world_body_wxyz = [1, 0, 0, 0]
+    features = case.recording.features
+    run = libloc.run_slam(features, options)
+    trajectory, _ = libloc.read_tum(out / "trajectory.tum")
+    assert np.array_equal(trajectory.times_ns, run.time_ns)
+    assert np.allclose(trajectory.position, run.position, rtol=0, atol=1e-9)
+    assert "body to world" in (out / "trajectory.tum").read_text().splitlines()[0]
+    columns = table(out / "frames.csv")
+    assert np.array_equal(columns["time_ns"], run.time_ns.astype(float))
+    for name, values in (
+        ("pz_m", run.position[:, 2]),
+        ("camera_px_m", run.camera_position[:, 0]),
+        ("vy_m_s", run.velocity[:, 1]),
+        ("sigma_px_m", np.sqrt(run.covariance[:, 3, 3])),
+        ("sigma_thetaz_rad", np.sqrt(run.covariance[:, 2, 2])),
+        ("nis", run.nis),
+        ("reprojection_after_px", run.reprojection_after_px),
+    ):
+        assert np.allclose(columns[name], values, rtol=0, atol=1e-9, equal_nan=True), name
+    assert np.isnan(columns["reprojection_before_px"][0])
+    assert np.isnan(columns["bax_m_s2"]).all()
+    for name, values in run.counts.items():
+        assert np.array_equal(columns[name], values), name
+    assert len(read_estimate(out / "frames.csv", "").times_ns) == FRAMES  # loc-evaluate takes it
+
+    header, body = (out / "map.ply").read_text().split("end_header\n")
+    points = np.array([[float(x) for x in line.split()] for line in body.splitlines()])
+    assert f"element vertex {len(points)}" in header
+    known = np.isfinite(run.map.position).all(axis=1)
+    assert len(points) == known.sum() > 40
+    assert np.allclose(points[:, :3], run.map.position[known], rtol=1e-6)
+    assert np.array_equal(points[:, 3], run.map.id[known])
+    largest = np.sqrt(np.linalg.norm(run.map.position_cov[known], ord=2, axis=(1, 2)))
+    assert np.allclose(points[:, 4], largest, rtol=1e-5)
+
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["method"] == "mono-slam"
+    assert summary["finished"]
+    assert summary["frames"] == {"in_input": FRAMES, "used": FRAMES}
+    assert summary["estimator"]["slam.measured"] == run.counts["measured"].sum()
+    assert summary["reprojection_px"]["after"] == pytest.approx(
+        np.sqrt(np.nanmean(run.reprojection_after_px**2)), rel=1e-6
+    )
+    # The error is that of SciPy's alignment of the centred paths, with the least-squares scale.
+    from scipy.spatial.transform import Rotation
+
+    truth = case.recording.reference
+    rows = np.searchsorted(truth.times_ns, run.time_ns)
+    a, b = (x - x.mean(axis=0) for x in (run.position, truth.position[rows]))
+    turned = Rotation.align_vectors(b, a)[0].apply(a)
+    scale = np.sum(turned * b) / np.sum(a * a)
+    expected = np.sqrt(np.mean(np.sum((scale * turned - b) ** 2, axis=1)))
+    assert summary["truth"]["alignment"] == "sim3"
+    assert summary["truth"]["rmse_m"] == pytest.approx(expected, rel=1e-5)
+    assert summary["truth"]["scale"] == pytest.approx(scale, rel=1e-5)
+    length = np.linalg.norm(np.diff(truth.position[rows], axis=0), axis=1).sum()
+    assert summary["truth"]["path_length_m"] == pytest.approx(length)
+    assert expected < 0.02 * length
+
+
+def test_a_log_brings_its_own_truth(case, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert call(case.log, "--config", case.rig, "--output", out, "--pose", "camera", "--no-plots") == 0
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["input"]["format"] == "lcm"
+    assert summary["truth"]["file"] == str(case.log)
+    assert summary["truth"]["pairs"] == FRAMES
+    assert not list(out.glob("*.png"))
+    trajectory, _ = libloc.read_tum(out / "trajectory.tum")
+    columns = table(out / "frames.csv")
+    camera = np.stack([columns[f"camera_p{axis}_m"] for axis in "xyz"], axis=1)
+    assert np.allclose(trajectory.position, camera, rtol=0, atol=1e-9)
+    assert not np.allclose(camera, np.stack([columns[f"p{axis}_m"] for axis in "xyz"], axis=1), atol=0.01)
+    assert "camera to world" in (out / "trajectory.tum").read_text().splitlines()[0]
+    capsys.readouterr()
+    # Settings by name; the rigid alignment cannot take up the unit.
+    settings = [
+        "--set",
+        "map.max_features=40",
+        "--set",
+        "consistency=plain",
+        "--set",
+        "association.ransac=false",
+    ]
+    assert call(case.log, "--config", case.rig, "--align", "se3", *settings) == 0
+    assert "map            40 points" in capsys.readouterr().out
+
+
+def test_what_is_wrong_is_named(case, tmp_path, capsys):
+    rig = ["--config", case.rig]
+    without_camera = tmp_path / "imu.yaml"
+    other = libloc.read_rig(case.rig)
+    other.cameras = []
+    libloc.write_rig(without_camera, other)
+    slow = tmp_path / "slow.yaml"
+    other = libloc.read_rig(case.rig)
+    camera = other.cameras[0]
+    camera.rate_hz = 0
+    other.cameras = [camera]
+    libloc.write_rig(slow, other)
+    broken = tmp_path / "broken.tracks"
+    broken.write_text("0 1 0 10\n0 1 1 nan\n")
+    imu_only = tmp_path / "imu.csv"
+    imu_only.write_text("time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2\n0,0,0,0,0,0,9.8\n")
+    for arguments, message in (
+        ([tmp_path / "none", *rig], "none: no such file or folder"),
+        ([case.tracks, "--config", tmp_path / "no.yaml"], "no.yaml"),
+        ([case.tracks, "--config", without_camera], "imu.yaml: has 0 cameras, --camera is 0"),
+        ([case.tracks, *rig, "--camera", 1], "rig.yaml: has 1 cameras, --camera is 1"),
+        ([case.tracks, "--config", slow], "walk.tracks: a tracks file has no times: give --rate-hz"),
+        ([broken, *rig], "broken.tracks:2"),
+        ([case.truth, *rig], "holds no measurements"),
+        ([imu_only, *rig], "imu.csv: no features of camera 0 in it; it holds none at all"),
+        ([case.log, *rig, "--rate-hz", 20], "walk.lcm: is a recording with times of its own, --rate-hz"),
+        ([case.log, *rig, "--set", "map.max_feature=3"], "--set map.max_feature=3: must be NAME=VALUE"),
+        ([case.log, *rig, "--set", "map.max_features=many"], "--set map.max_features=many: invalid literal"),
+        ([case.log, *rig, "--set", "map.max_features=1"], "map.max_features = 1: must be at least 4"),
+        ([case.log, *rig, "--set", "consistency=best"], "must be one of plain, first-estimate, invariant"),
+        # Times that have nothing in common, though a truth was asked for.
+        ([case.tracks, *rig, "--reference", case.truth], "truth.tum: no pose of the estimate"),
+        ([case.log, *rig, "--reference", imu_only], "imu.csv: no reference poses in it"),
+    ):
+        assert call(*arguments) == 1, message
+        error = capsys.readouterr().err
+        assert message in error, (message, error)
+        assert error.startswith("loc-slam: ")
+    for arguments, message in (
+        ([case.log, *rig, "--output", case.rig], "is not a folder"),
+        ([case.log, *rig, "--sigma-px", 0], "0: must be a positive number"),
+        ([case.log, *rig, "--camera", -1], "-1: must not be negative"),
+        ([case.log, *rig, "--start-time", "noon"], "noon: must be seconds"),
+        ([case.log], "--config"),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            call(*arguments)
+        assert ended.value.code == 2
+        assert message in capsys.readouterr().err
+
+
+def test_interrupted_it_writes_what_there_is(case, tmp_path, capsys, monkeypatch):
+    @contextmanager
+    def progress():
+        # As if Ctrl-C were pressed while the filter is at work.
+        yield lambda done, total: signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(slam, "_progress", progress)
+    before = signal.getsignal(signal.SIGINT)
+    out = tmp_path / "out"
+    assert call(case.log, "--config", case.rig, "--output", out, "--no-plots") == 130
+    assert signal.getsignal(signal.SIGINT) == before
+    captured = capsys.readouterr()
+    summary = json.loads((out / "summary.json").read_text())
+    used = summary["frames"]["used"]
+    assert 0 < used < FRAMES
+    assert not summary["finished"]
+    assert f"loc-slam: interrupted after {used} of {FRAMES} frames" in captured.err
+    assert f"{used} used of {FRAMES}: interrupted" in captured.out
+    assert len(table(out / "frames.csv")["time_ns"]) == used
+    assert libloc.read_tum(out / "trajectory.tum")[0].times_ns.size == used
+
+
+def test_progress_without_rich(case, capsys, monkeypatch):
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    monkeypatch.setitem(sys.modules, "rich.console", None)
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    assert call(case.log, "--config", case.rig) == 0
+    assert f"\rloc-slam: {FRAMES} of {FRAMES} frames, 0 s left" in terminal.getvalue()
+    assert terminal.getvalue().endswith("\n")
