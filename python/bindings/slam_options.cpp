@@ -118,6 +118,36 @@ void bind_inertial_options(py::module_& m) {
       .def("check", &S::check, "ValueError names a field that is out of range.");
 }
 
+void bind_start_options(py::module_& m) {
+  using O = loc::SlamStartOptions;
+  py::class_<O>(m, "SlamStartOptions",
+                "Start of InertialSlam in motion, from a window of IMU samples and tracks; every field is a keyword of "
+                "the constructor.")
+      .def(py::init([](const py::kwargs& fields) { return with_fields<O>("SlamStartOptions", fields); }),
+           "TypeError for an unknown field, ValueError for a value out of range.")
+      .def_readwrite("min_duration_s", &O::min_duration_s, "Of the frames that are looked at [s].")
+      .def_readwrite("max_duration_s", &O::max_duration_s, "Older ones are forgotten [s].")
+      .def_readwrite("min_frames", &O::min_frames)
+      .def_readwrite("max_frames", &O::max_frames, "Of more, so many spread evenly are looked at.")
+      .def_readwrite("min_features", &O::min_features)
+      .def_readwrite("max_features", &O::max_features, "Those with the longest tracks.")
+      .def_readwrite("min_observations", &O::min_observations, "Of a feature.")
+      .def_readwrite("max_gap_s", &O::max_gap_s, "Between IMU samples; a longer one begins anew [s].")
+      .def_readwrite("sigma_px", &O::sigma_px, "Not used by InertialSlam, which has its own [px].")
+      .def_readwrite("max_sigma_ratio", &O::max_sigma_ratio, "Residuals may be so much larger than sigma_px says.")
+      .def_readwrite("min_inliers", &O::min_inliers, "Share of observations that must fit.")
+      .def_readwrite("min_parallax", &O::min_parallax,
+                     "Median over the features of the largest, in deviations of an observation.")
+      .def_readwrite("max_scale_sigma", &O::max_scale_sigma, "Relative deviation of the scale.")
+      .def_readwrite("velocity_floor", &O::velocity_floor,
+                     "A deviation of the velocity below max_scale_sigma times this is good enough [m/s].")
+      .def_readwrite("max_tilt_sigma", &O::max_tilt_sigma, "[rad]")
+      .def_readwrite("max_condition", &O::max_condition, "Of the normal equations.")
+      .def_readwrite("gyroscope_bias_sigma", &O::gyroscope_bias_sigma, "Wide prior [rad/s].")
+      .def_readwrite("sampling", &O::sampling, "ImuSampling: what an IMU sample says.")
+      .def("check", &O::check, "ValueError names a field that is out of range.");
+}
+
 void bind_landmark(py::module_& m) {
   py::class_<KnownLandmark> c(m, "KnownLandmark",
                               "A point whose place in world is known: it gives the scale and ties the world.");
@@ -159,7 +189,8 @@ void bind_slam_options_struct(py::module_& m) {
       .def_readwrite("camera_index", &O::camera_index, "Which frames are ours.");
   vector_property(c, "position", &O::position, "Start: of body in world (3,) (X_cam) [m].");
   c.def_property(
-      "q_world_body_wxyz", [](const O& o) -> py::object {
+      "q_world_body_wxyz",
+      [](const O& o) -> py::object {
         if (!o.q_world_body) return py::none();
         return to_wxyz(*o.q_world_body);
       },
@@ -178,6 +209,9 @@ void bind_slam_options_struct(py::module_& m) {
       .def_readwrite("angular_acceleration_density", &O::angular_acceleration_density,
                      "Q, camera alone [rad/s^2/sqrt(Hz)].")
       .def_readwrite("imu_noise", &O::imu_noise, "Q, with an IMU; biases begin with its deviations.")
+      .def_readwrite("vibration_part", &O::vibration_part,
+                     "So much of the variance by which readings differ from sample to sample counts as white noise of "
+                     "the IMU.")
       .def_readwrite("gravity", &O::gravity, "[m/s^2]")
       .def_readwrite("sigma_px", &O::sigma_px, "R: deviation of one coordinate, of frames that do not say [px].")
       .def_readwrite("override_sigma", &O::override_sigma, "sigma_px also in place of what frames say.")
@@ -195,6 +229,9 @@ void bind_slam_options_struct(py::module_& m) {
       .def_readwrite("max_gap_s", &O::max_gap_s,
                      "Camera alone: after a longer pause between frames the motion is unknown [s].")
       .def_readwrite("start", &O::start, "With an IMU: FusionStartOptions, start from rest.")
+      .def_readwrite("moving_start", &O::moving_start, "With an IMU: SlamStartOptions, start from motion.")
+      .def_readwrite("moving_start_factor", &O::moving_start_factor,
+                     "By which the deviations of a start from motion are multiplied: what it rests on is used again.")
       .def_readwrite("stand_still", &O::stand_still, "With an IMU: StandStillOptions, when the body rests.")
       .def_readwrite("zero_velocity", &O::zero_velocity, "The velocity is zero while IMU and picture stand still.")
       .def_readwrite("zero_velocity_sigma", &O::zero_velocity_sigma, "[m/s]")
@@ -208,6 +245,8 @@ void bind_slam_options_struct(py::module_& m) {
       .def_readwrite("gap_angular_velocity_sigma", &O::gap_angular_velocity_sigma, "The same [rad/s].")
       .def_readwrite("max_angular_velocity", &O::max_angular_velocity, "A sample with more is skipped [rad/s].")
       .def_readwrite("max_specific_force", &O::max_specific_force, "A sample with more is skipped [m/s^2].")
+      .def_readwrite("recover_after", &O::recover_after,
+                     "Frames in a row of which most is not believed: the motion is taken for unknown (RECOVERED).")
       .def_readwrite("lost_after_s", &O::lost_after_s,
                      "Without a frame of enough features: estimates say so (FEW_FEATURES) [s].")
       .def("check", &O::check, "ValueError names a field that is out of range.");
@@ -274,6 +313,7 @@ void bind_slam_options(py::module_& m) {
   bind_map_options(m);
   bind_association_options(m);
   bind_inertial_options(m);
+  bind_start_options(m);
   bind_landmark(m);
   bind_slam_options_struct(m);
   bind_inverse_depth(m);

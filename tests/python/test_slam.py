@@ -69,7 +69,7 @@ def camera_path(count: int):
     """Times, and poses of body: sideways, with a little of everything."""
     t = np.arange(count) * DT_NS * 1e-9
     position = np.stack([0.3 * np.sin(0.5 * t), np.sin(0.5 * t), 0.3 * (1 - np.cos(0.7 * t))], axis=1)
-    start = to_scipy(libloc.SlamOptions().q_world_body_wxyz)
+    start = to_scipy([0.5, -0.5, 0.5, -0.5])
     turn = Rotation.from_euler("xyz", np.stack([0.1 * np.sin(t), 0.05 * t, 0.1 * np.cos(t) - 0.1], axis=1))
     return np.rint(t * 1e9).astype(np.int64) + 10**18, position, start * turn
 
@@ -291,6 +291,94 @@ def test_a_camera_that_moves_is_found():
     assert np.allclose(run.map.position[known], scene[run.map.id[known] - 100], atol=0.005)
 
 
+@pytest.fixture(scope="module")
+def walk() -> tuple[libloc.Recording, libloc.Rig]:
+    """Somebody stands, then walks: IMU, features, truth."""
+    scenario = libloc.Scenario("pedestrian", duration_s=9, parameters={"camera.max_features": 60})
+    for stream in ("gps", "magnetometer", "odometry"):
+        scenario.set(f"streams.{stream}", False)
+    return libloc.simulate(scenario, 2).recording, scenario.rig()
+
+
+def inertial_options(rig: libloc.Rig) -> libloc.SlamOptions:
+    return libloc.SlamOptions(
+        motion=libloc.SlamMotion.INERTIAL, camera=rig.cameras[0], imu_noise=rig.imu.noise
+    )
+
+
+def test_with_an_imu_step_by_step_is_the_whole_recording(walk):
+    recording, rig = walk
+    features, imu = recording.features, recording.imu
+    whole = libloc.run_slam(recording, inertial_options(rig), with_features=True)
+    slam = libloc.InertialSlam(inertial_options(rig))
+    frames, used, waited = [], 0, 0
+    for i in range(len(features.times_ns)):
+        while used < len(imu.times_ns) and imu.times_ns[used] <= features.times_ns[i]:
+            slam.process(
+                libloc.ImuMeasurement(
+                    imu.times_ns[used], imu.angular_velocity[used], imu.specific_force[used]
+                )
+            )
+            waited = max(waited, len(slam.frames()))
+            frames += slam.frames()
+            used += 1
+        assert not feed(slam, features, i)  # a frame waits for the IMU
+        assert slam.frames() == []
+    for k in range(used, len(imu.times_ns)):
+        slam.process(libloc.ImuMeasurement(imu.times_ns[k], imu.angular_velocity[k], imu.specific_force[k]))
+        frames += slam.frames()
+    assert waited > 5  # those of before the start
+    assert len(frames) == len(whole) > 170
+    assert np.array_equal(whole.time_ns, [f.time_ns for f in frames])
+    for name in (
+        "position",
+        "velocity",
+        "q_world_body_wxyz",
+        "gyroscope_bias",
+        "accelerometer_bias",
+        "covariance",
+    ):
+        got = [getattr(f.estimate, name) for f in frames]
+        assert np.array_equal(getattr(whole, name), got), name
+    assert np.array_equal(whole.features.id, np.concatenate([f.features.id for f in frames]))
+    assert whole.covariance.shape == (len(frames), 15, 15)
+    assert not np.any(whole.status & libloc.EstimateStatus.SCALE_UNKNOWN)
+    assert whole.totals["imu.used"] > 1000
+
+    # Metres, and the world is level: against the truth without any scale.
+    truth = recording.reference
+    rows = np.searchsorted(truth.times_ns, whole.time_ns)
+    assert libloc.align_points(whole.position, truth.position[rows], "yaw").rms_residual < 0.1
+    up = to_scipy(whole.q_world_body_wxyz).inv().apply([0, 0, 1])
+    true_up = to_scipy(truth.q_world_body_wxyz[rows]).inv().apply([0, 0, 1])
+    assert np.rad2deg(np.arccos(np.clip(np.sum(up * true_up, axis=1), -1, 1))).max() < 1
+
+
+def test_the_rig_corrects_the_imu(walk):
+    recording, rig = walk
+    options = inertial_options(rig)
+    plain = libloc.run_slam(recording, options)
+    imu = libloc.ImuCalibration()
+    imu.noise = rig.imu.noise
+    imu.gyroscope = libloc.TriadCalibration()
+    imu.gyroscope.bias = [0.01, -0.02, 0.03]
+    other = libloc.Rig()
+    other.imu = imu
+    slam = libloc.InertialSlam(options)
+    f = recording.features
+    by_hand = slam.run(
+        f.times_ns, f.first, f.id, f.pixel_px, recording.imu.times_ns,
+        recording.imu.angular_velocity - imu.gyroscope.bias, recording.imu.specific_force,
+        sigma_px=f.sigma_px,
+    )  # fmt: skip
+    corrected = libloc.run_slam(recording, options, rig=other)
+    assert np.array_equal(corrected.position, by_hand.position)
+    difference = plain.gyroscope_bias[-1] - corrected.gyroscope_bias[-1]
+    assert np.allclose(difference, imu.gyroscope.bias, atol=1e-3)
+    with pytest.raises(ValueError, match="no IMU samples"):
+        libloc.run_slam(f, options)
+
+
 def test_snapshot_and_reset():
     features = tracks(30, 40, 0.5)
     options = libloc.SlamOptions(camera=calibration())
@@ -321,14 +409,12 @@ def test_snapshot_and_reset():
 
 
 def test_every_option_is_there():
-    folder = CHECKOUT / "libloc/estimators"
-    header = "".join(
-        (folder / f"{x}.hpp").read_text() for x in ("slam_options", "fusion_start", "stand_still")
-    )
+    files = ("slam_options", "fusion_start", "stand_still", "slam_start")
+    header = "".join((CHECKOUT / f"libloc/estimators/{name}.hpp").read_text() for name in files)
     for name in ("SlamMapOptions", "SlamAssociationOptions", "SlamOptions", "KnownLandmark",
-                 "FusionStartOptions", "StandStillOptions"):  # fmt: skip
+                 "FusionStartOptions", "StandStillOptions", "SlamStartOptions"):  # fmt: skip
         body = re.search(rf"struct {name} \{{(.*?)\n\}};", header, re.S)[1]
-        fields = re.findall(r"^  [\w:]+(?:<\w+>)? (\w+)(?: =[^;]*|\{[^}]*\})?;", body, re.M)
+        fields = re.findall(r"^  [\w:]+(?:<[\w:]+>)? (\w+)(?:\s+=[^;]*|\{[^}]*\})?;", body, re.M)
         assert len(fields) >= 3, name
         for field in fields:
             field = "q_world_body_wxyz" if field == "q_world_body" else field

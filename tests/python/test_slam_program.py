@@ -54,6 +54,13 @@ class Case:
                 r.q_world_body_wxyz = truth.q_world_body_wxyz[k].tolist()
                 r.position, r.velocity = truth.position[k].tolist(), truth.velocity[k].tolist()
                 log.write("LOC_REFERENCE", r, time_ns // 1000)
+            imu = self.recording.imu
+            for i, time_ns in enumerate(int(t) for t in imu.times_ns):
+                s = loc.imu_t()
+                s.time_ns, s.host_time_ns, s.sequence = time_ns, time_ns, i
+                s.angular_velocity = imu.angular_velocity[i].tolist()
+                s.specific_force = imu.specific_force[i].tolist()
+                log.write("LOC_IMU", s, time_ns // 1000)
 
 
 @pytest.fixture(scope="module")
@@ -178,6 +185,28 @@ def test_a_log_brings_its_own_truth(case, tmp_path, capsys):
     assert "map            40 points" in capsys.readouterr().out
 
 
+def test_with_an_imu(case, tmp_path, capsys):
+    out = tmp_path / "out"
+    arguments = [case.log, "--config", case.rig, "--method", "inertial-slam"]
+    assert call(*arguments, "--output", out) == 0
+    assert "units of its own" not in capsys.readouterr().out
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["metric"]
+    assert summary["truth"]["alignment"] == "se3"
+    assert summary["truth"]["rmse_m"] < 0.005 * summary["truth"]["path_length_m"]
+    assert summary["path_length"] == pytest.approx(summary["truth"]["path_length_m"], rel=0.01)
+    assert (out / "inertial.png").read_bytes()[:4] == b"\x89PNG"
+    columns = table(out / "frames.csv")
+    assert np.isfinite(columns["bax_m_s2"]).all()
+    assert (columns["sigma_baz_m_s2"][-1:] > 0).all()
+    capsys.readouterr()
+    camera_only = libloc.read_rig(case.rig)
+    camera_only.imu = None
+    libloc.write_rig(tmp_path / "camera.yaml", camera_only)
+    assert call(*arguments, "--config", tmp_path / "camera.yaml") == 0
+    assert "camera.yaml: no imu in it: its noise is a guess" in capsys.readouterr().err
+
+
 def test_what_is_wrong_is_named(case, tmp_path, capsys):
     rig = ["--config", case.rig]
     without_camera = tmp_path / "imu.yaml"
@@ -203,6 +232,7 @@ def test_what_is_wrong_is_named(case, tmp_path, capsys):
         ([broken, *rig], "broken.tracks:2"),
         ([case.truth, *rig], "holds no measurements"),
         ([imu_only, *rig], "imu.csv: no features of camera 0 in it; it holds none at all"),
+        ([case.tracks, *rig, "--method", "inertial-slam"], "walk.tracks: no IMU samples in it"),
         ([case.log, *rig, "--rate-hz", 20], "walk.lcm: is a recording with times of its own, --rate-hz"),
         ([case.log, *rig, "--set", "map.max_feature=3"], "--set map.max_feature=3: must be NAME=VALUE"),
         ([case.log, *rig, "--set", "map.max_features=many"], "--set map.max_features=many: invalid literal"),

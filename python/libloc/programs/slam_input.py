@@ -135,6 +135,8 @@ def _parsed(old: Any, text: str) -> Any:
         if len(values) != len(old):
             raise ValueError(f"must be {len(old)} numbers with commas between them")
         return values
+    if old is None:
+        return [float(x) for x in text.split(",")] if "," in text else float(text)
     raise ValueError("cannot be set here")
 
 
@@ -149,7 +151,7 @@ def set_option(options: SlamOptions, setting: str) -> None:
         raise ValueError(f"--set {setting}: must be NAME=VALUE, with a field of SlamOptions")
     try:
         setattr(target, last, _parsed(getattr(target, last), text))
-    except ValueError as error:
+    except (TypeError, ValueError) as error:
         raise ValueError(f"--set {setting}: {error}") from None
 
 
