@@ -15,6 +15,7 @@
 #include "libloc/geometry/trajectory.hpp"
 #include "libloc/io/broad.hpp"
 #include "libloc/io/csv.hpp"
+#include "libloc/io/eqvio.hpp"
 #include "libloc/io/euroc.hpp"
 #include "libloc/io/lcm_log.hpp"
 #include "libloc/io/rig_yaml.hpp"
@@ -229,6 +230,20 @@ void bind_sources(py::module_& m) {
       "A CSV file whose first line names columns and units: time_ns or \"t [s]\", wx wy wz, ax ay az, mx my mz, "
       "qw qx qy qz, px py pz, latitude longitude altitude, odo_px odo_py odo_pz ... The units given here are for "
       "headings that have none.");
+  py::class_<loc::EqvioSource, MeasurementSource>(m, "EqvioSource",
+                                                  "Tracks and IMU of a file of GTSAM's EqVIO example.")
+      .def_property_readonly(
+          "rig", [](const loc::EqvioSource& self) { return self.rig(); }, "Has the camera that the pixels are of.");
+  m.def(
+      "open_eqvio",
+      [](const fs::path& path, const std::optional<loc::CameraCalibration>& camera, double sigma_px) {
+        return loc::open_eqvio(path, {.camera = camera, .sigma_px = sigma_px});
+      },
+      py::arg("path"), py::kw_only(), py::arg("camera") = py::none(), py::arg("sigma_px") = loc::kUnknown,
+      "Tracks and IMU of a file of GTSAM's EqVIO example, whose points are without pixels: as the camera would have "
+      "seen "
+      "them, by default a pinhole of the file's focal lengths.");
+  m.def("is_eqvio", &loc::is_eqvio, py::arg("path"), "Whether the first line is the heading of such a file.");
   m.def(
       "open_broad",
       [](const fs::path& path, bool reference) {

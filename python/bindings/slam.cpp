@@ -211,6 +211,7 @@ SlamRun PySlam<Slam>::run(const SlamInput& in, std::optional<py::function> callb
   SlamRun out = columns.take();
   out.map = arrays_of(map);
   out.totals = as_map(slam.counts());
+  if (slam.running()) out.snapshot = slam.snapshot();
   out.stopped = !go_on;
   return out;
 }

@@ -282,6 +282,7 @@ void bind_run(py::module_& m) {
       .def_readonly("first", &R::first, "(N + 1,): features of frame i are rows first[i]:first[i + 1]")
       .def_readonly("features", &R::features, "SlamFeatureArrays of all frames, when asked for")
       .def_readonly("map", &R::map, "SlamMapArrays, at the end")
+      .def_readonly("snapshot", &R::snapshot, "SlamSnapshot at the end, to go on from; None before the start.")
       .def_readonly("stopped", &R::stopped, "progress() asked for it")
       .def("__len__", [](const R& r) { return r.time_ns.size(); });
 }

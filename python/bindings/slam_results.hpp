@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,7 @@ struct SlamRun {
   py::array_t<std::int64_t> first;
   SlamFeatureArrays features;
   SlamMapArrays map;
+  std::optional<loc::SlamSnapshot> snapshot;
   bool stopped = false;
 };
 

@@ -1,4 +1,4 @@
-"""Opens a recording by what the file is: EuRoC folder, BROAD trial, CSV, LCM log, NMEA log."""
+"""Opens a recording by what the file is: EuRoC folder, BROAD trial, CSV, EqVIO file, LCM log, NMEA log."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from libloc._core import (
     DataError,
     MeasurementSource,
     Recording,
+    is_eqvio,
     open_broad,
     open_csv,
+    open_eqvio,
     open_euroc,
     open_lcm_log,
     open_nmea,
@@ -22,7 +24,7 @@ _NMEA_SENTENCE = re.compile(rb"\$[A-Z]{5},[ -#%-)+-~]*\*[0-9A-Fa-f]{2}")
 
 
 def file_format(path: str | PathLike[str]) -> str:
-    """One of euroc (a folder), broad (MATLAB v5), lcm (LCM log), nmea, csv, tum: by content, not name.
+    """One of euroc (a folder), broad (MATLAB v5), lcm (LCM log), nmea, eqvio, csv, tum: by content, not name.
 
     Raises DataError when the path does not exist, is empty, or is nothing of this.
     """
@@ -46,7 +48,9 @@ def file_format(path: str | PathLike[str]) -> str:
     lines = [line.strip() for line in head.splitlines()]
     data = [line for line in lines if line and not line.startswith(b"#")]
     # A CSV heading may be a comment line, a TUM file's comments may hold commas: the data tell.
-    return "csv" if b"," in (data or lines)[0] else "tum"
+    if b"," not in (data or lines)[0]:
+        return "tum"
+    return "eqvio" if is_eqvio(path) else "csv"
 
 
 def open_recording(path: str | PathLike[str]) -> MeasurementSource:
@@ -61,6 +65,7 @@ def open_recording(path: str | PathLike[str]) -> MeasurementSource:
         "euroc": open_euroc,
         "broad": open_broad,
         "csv": open_csv,
+        "eqvio": open_eqvio,
         "lcm": open_lcm_log,
         "nmea": open_nmea,
     }

@@ -19,6 +19,7 @@ from libloc._core import (
     SlamMotion,
     SlamOptions,
     SlamRun,
+    SlamSnapshot,
     TriadCalibration,
 )
 from libloc.recordings import read_recording
@@ -90,15 +91,17 @@ def run_slam(
     options: SlamOptions,
     *,
     rig: Rig | None = None,
+    start_from: SlamSnapshot | None = None,
     progress: Callable[[int, int], bool | None] | None = None,
     with_covariance: bool = True,
     with_features: bool = False,
 ) -> SlamRun:
     """Runs the estimator that options.motion names over a recording; other cameras' frames are passed over.
 
-    rig: its calibration is applied to the IMU. progress(frames done, frames in all) is called a few times in
-    a second; when it returns False the run ends, with what there is. Raises ValueError when the recording
-    lacks what the estimator needs; DataError when it cannot be read.
+    rig: its calibration is applied to the IMU. start_from: goes on from there, see restore().
+    progress(frames done, frames in all) is called a few times in a second; when it returns False the run
+    ends, with what there is. Raises ValueError when the recording lacks what the estimator needs; DataError
+    when it cannot be read.
     """
     if isinstance(recording, MeasurementSource):
         recording = recording.read_all()
@@ -116,11 +119,17 @@ def run_slam(
         "with_features": with_features,
     }
     if options.motion == SlamMotion.CONSTANT_VELOCITY:
-        return MonoSlam(options).run(*frames, **settings)
+        mono = MonoSlam(options)
+        if start_from is not None:
+            mono.restore(start_from)
+        return mono.run(*frames, **settings)
     imu = recording.imu if isinstance(recording, Recording) else None
     if imu is None or len(imu.times_ns) == 0:
         raise ValueError("the recording has no IMU samples, which InertialSlam needs")
     gyro, force = imu.angular_velocity, imu.specific_force
     if rig is not None and rig.imu is not None:
         gyro, force = _applied(rig.imu.gyroscope, gyro), _applied(rig.imu.accelerometer, force)
-    return InertialSlam(options).run(*frames, imu.times_ns, gyro, force, **settings)
+    inertial = InertialSlam(options)
+    if start_from is not None:
+        inertial.restore(start_from)
+    return inertial.run(*frames, imu.times_ns, gyro, force, **settings)

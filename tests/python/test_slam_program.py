@@ -40,28 +40,39 @@ class Case:
             self.truth, libloc.Trajectory(truth.times_ns, truth.q_world_body_wxyz, truth.position)
         )
         self.log = folder / "walk.lcm"
-        with LogWriter(self.log) as log:
-            for i, time_ns in enumerate(int(t) for t in features.times_ns):
+        self.write_log(self.log)
+
+    def write_log(self, path: Path, begin_s: float = 0, end_s: float = np.inf) -> None:
+        """What was measured in this part of the walk."""
+        r = self.recording
+        begin_ns, end_ns = START_NS + begin_s * 1e9, START_NS + end_s * 1e9
+        with LogWriter(path) as log:
+
+            def write(channel, m, i, time_ns):
+                m.time_ns, m.host_time_ns, m.sequence = int(time_ns), int(time_ns), i
+                if begin_ns <= time_ns < end_ns:
+                    log.write(channel, m, int(time_ns) // 1000)
+
+            for i, time_ns in enumerate(r.features.times_ns):
                 m = loc.tracks_t()
-                rows = slice(features.first[i], features.first[i + 1])
-                m.time_ns, m.host_time_ns, m.sequence, m.sigma_px = time_ns, time_ns, i, 0.5
-                m.feature_id = features.id[rows].tolist()
-                m.u_px, m.v_px = features.pixel_px[rows].T.tolist()
+                rows = slice(r.features.first[i], r.features.first[i + 1])
+                m.sigma_px = 0.5
+                m.feature_id = r.features.id[rows].tolist()
+                m.u_px, m.v_px = r.features.pixel_px[rows].T.tolist()
                 m.size = len(m.feature_id)
-                log.write("LOC_TRACKS", m, time_ns // 1000)
-                r = loc.reference_t()
-                k = int(np.searchsorted(truth.times_ns, time_ns))
-                r.time_ns, r.host_time_ns, r.sequence, r.score = time_ns, time_ns, i, True
-                r.q_world_body_wxyz = truth.q_world_body_wxyz[k].tolist()
-                r.position, r.velocity = truth.position[k].tolist(), truth.velocity[k].tolist()
-                log.write("LOC_REFERENCE", r, time_ns // 1000)
-            imu = self.recording.imu
-            for i, time_ns in enumerate(int(t) for t in imu.times_ns):
-                s = loc.imu_t()
-                s.time_ns, s.host_time_ns, s.sequence = time_ns, time_ns, i
-                s.angular_velocity = imu.angular_velocity[i].tolist()
-                s.specific_force = imu.specific_force[i].tolist()
-                log.write("LOC_IMU", s, time_ns // 1000)
+                write("LOC_TRACKS", m, i, time_ns)
+                truth = loc.reference_t()
+                k = int(np.searchsorted(r.reference.times_ns, time_ns))
+                truth.score = True
+                truth.q_world_body_wxyz = r.reference.q_world_body_wxyz[k].tolist()
+                truth.position = r.reference.position[k].tolist()
+                truth.velocity = r.reference.velocity[k].tolist()
+                write("LOC_REFERENCE", truth, i, time_ns)
+            for i, time_ns in enumerate(r.imu.times_ns):
+                sample = loc.imu_t()
+                sample.angular_velocity = r.imu.angular_velocity[i].tolist()
+                sample.specific_force = r.imu.specific_force[i].tolist()
+                write("LOC_IMU", sample, i, time_ns)
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +96,15 @@ def test_all_files_from_a_tracks_file(case, tmp_path, capsys):
     text = capsys.readouterr().out
     assert f"frames         {FRAMES} used of {FRAMES}" in text
     assert "units of its own: one camera cannot tell metres" in text
-    names = ["summary.json", "summary.txt", "trajectory.tum", "frames.csv", "map.ply"]
+    names = [
+        "summary.json",
+        "summary.txt",
+        "trajectory.tum",
+        "frames.csv",
+        "map.ply",
+        "slam.yaml",
+        "state.slam",
+    ]
     assert sorted(p.name for p in out.iterdir()) == sorted(names)
     for name in names:
         assert f"written: {out / name}" in text
@@ -139,6 +158,7 @@ def test_all_files_from_a_tracks_file(case, tmp_path, capsys):
     assert summary["reprojection_px"]["after"] == pytest.approx(
         np.sqrt(np.nanmean(run.reprojection_after_px**2)), rel=1e-6
     )
+    assert libloc.read_slam_options(out / "slam.yaml").sigma_px == 0.5
     # The error is that of SciPy's alignment of the centred paths, with the least-squares scale.
     from scipy.spatial.transform import Rotation
 
@@ -184,6 +204,106 @@ def test_a_log_brings_its_own_truth(case, tmp_path, capsys):
     assert "map            40 points" in capsys.readouterr().out
 
 
+def test_what_the_pictures_show(case):
+    """The aligned path and its deviations, which figures draw, are those of the error."""
+    options = slam.make_parser().parse_args([str(case.log), "--config", str(case.rig)])
+    truth = slam.run(options).truth
+    distance = np.linalg.norm(truth.estimate - truth.reference, axis=1)
+    assert np.allclose(distance, truth.absolute.translation_m, rtol=0, atol=1e-9)
+    run = slam.run(options).run
+    stated = np.trace(run.covariance[truth.rows, 3:6, 3:6], axis1=1, axis2=2)
+    scale = truth.absolute.alignment.scale
+    assert scale > 1.5
+    assert np.allclose(np.sum(truth.sigma**2, axis=1), scale**2 * stated, rtol=1e-9, atol=1e-12)
+
+
+def test_settings_of_a_file_and_a_map_to_go_on_from(case, tmp_path, capsys):
+    settings = tmp_path / "slam.yaml"
+    settings.write_text("format: libloc-slam-1\nmotion: inertial\nmap:\n  max_features: 64\n")
+    runs = []
+    base = ["--config", case.rig, "--slam-config", settings, "--no-plots"]
+    for name, begin_s, end_s in (("first", 0, 6), ("second", 6, 9)):
+        log, out = tmp_path / f"{name}.lcm", tmp_path / name
+        case.write_log(log, begin_s, end_s)
+        go_on = ["--map-in", tmp_path / "first/state.slam"] if runs else []
+        assert call(log, *base, *go_on, "--output", out) == 0
+        summary = json.loads((out / "summary.json").read_text())
+        assert summary["method"] == "inertial-slam"
+        assert summary["map"]["points"] <= 64
+        assert libloc.read_slam_options(out / "slam.yaml").map.max_features == 64
+        runs.append(table(out / "frames.csv"))
+    saved = libloc.load_slam(tmp_path / "first/state.slam")
+    assert libloc.format_seconds(saved.snapshot.time_ns)[:12] == "1700000005.9"
+
+    # Both halves are in one world: what takes the first to the truth takes the second there, too.
+    truth = case.recording.reference
+
+    def places(run):
+        rows = np.searchsorted(truth.times_ns, START_NS + np.rint((run["time_ns"] - START_NS) / 1e6) * 1e6)
+        return np.stack([run[f"p{axis}_m"] for axis in "xyz"], axis=1), truth.position[rows]
+
+    to_truth = libloc.align_points(*places(runs[0]), "yaw").T_reference_estimate
+    place, true_place = places(runs[1])
+    assert len(place) > 35
+    assert np.linalg.norm(to_truth.transform(place) - true_place, axis=1).max() < 0.5
+    capsys.readouterr()
+    for arguments, message in (
+        (["--method", "mono-slam"], "slam.yaml: motion is another one than that of --method mono-slam"),
+        (["--map-in", case.rig], "rig.yaml"),
+        (["--map-in", tmp_path / "first/state.slam", "--set", "motion=constant-velocity"], "state.slam: "),
+    ):
+        assert call(case.log, *base, *arguments) == 1
+        assert message in capsys.readouterr().err
+    settings.write_text("format: libloc-slam-1\nmap:\n  most_features: 44\n")
+    assert call(case.log, "--config", case.rig, "--slam-config", settings) == 1
+    error = capsys.readouterr().err
+    assert "slam.yaml:3" in error
+    assert "most_features" in error
+
+
+def test_a_file_that_brings_its_camera(case, tmp_path, capsys):
+    """An EqVIO file needs no rig: the same tracks as points without distortion."""
+    features, imu = case.recording.features, case.recording.imu
+    camera = libloc.read_rig(case.rig).cameras[0]
+    rays = libloc.Camera(camera).unproject(features.pixel_px)
+    uv = rays[:, :2] / rays[:, 2:]
+    pose = camera.T_body_camera
+    meta = {"format_version": 1, "measurement_space": "normalized", "camera_fx": 458, "camera_fy": 457,
+            "camera_cx": 367, "camera_cy": 248}  # fmt: skip
+    meta |= {f"T_ci_t{axis}": repr(float(v)) for axis, v in zip("xyz", pose.translation, strict=True)}
+    meta |= {f"T_ci_q{axis}": repr(float(v)) for axis, v in zip("wxyz", pose.rotation_wxyz, strict=True)}
+    rows = ["row_type,t_abs,frame_idx,landmark_id,gx,gy,gz,ax,ay,az,u_norm,v_norm,key,value"]
+    rows += [f"meta,,,,,,,,,,,,{key},{value}" for key, value in meta.items()]
+    timed = [(t, 0, k) for k, t in enumerate(imu.times_ns)] + [
+        (t, 1, k) for k, t in enumerate(features.times_ns)
+    ]
+    for time_ns, kind, k in sorted(timed):
+        t = libloc.format_seconds(time_ns)
+        if kind == 0:
+            values = [*imu.angular_velocity[k].tolist(), *imu.specific_force[k].tolist()]
+            rows.append(f"imu,{t},,,{','.join(map(repr, values))},,,,")
+            continue
+        for m in range(features.first[k], features.first[k + 1]):
+            u, v = uv[m].tolist()
+            rows.append(f"vision_feature,{t},{k},{features.id[m]},,,,,,,{u!r},{v!r},,")
+    path = tmp_path / "eqvio.csv"
+    path.write_text("\n".join(rows) + "\n")
+    assert libloc.file_format(path) == "eqvio"
+    assert len(libloc.read_recording(path).imu.times_ns) == len(imu.times_ns)
+    out = tmp_path / "out"
+    truth = ["--reference", case.truth, "--output", out, "--no-plots", "--sigma-px", 0.5]
+    assert call(path, "--method", "inertial-slam", *truth) == 0
+    assert "eqvio.csv: no calibration of the IMU in it, its noise is a guess" in capsys.readouterr().err
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["truth"]["rmse_m"] < 0.01 * summary["truth"]["path_length_m"]
+    assert call(path, "--config", case.rig, "--method", "inertial-slam", *truth) == 0
+    assert "guess" not in capsys.readouterr().err
+    with_lens = json.loads((out / "summary.json").read_text())
+    assert with_lens["truth"]["rmse_m"] < 0.01 * with_lens["truth"]["path_length_m"]
+    assert call(path, "--camera", 1) == 1
+    assert "no features of camera 1" in capsys.readouterr().err
+
+
 def test_with_an_imu(case, tmp_path, capsys):
     out = tmp_path / "out"
     arguments = [case.log, "--config", case.rig, "--method", "inertial-slam"]
@@ -202,7 +322,7 @@ def test_with_an_imu(case, tmp_path, capsys):
     camera_only.imu = None
     libloc.write_rig(tmp_path / "camera.yaml", camera_only)
     assert call(*arguments, "--config", tmp_path / "camera.yaml") == 0
-    assert "camera.yaml: no imu in it: its noise is a guess" in capsys.readouterr().err
+    assert "camera.yaml: no calibration of the IMU in it, its noise is a guess" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -249,6 +369,7 @@ def test_what_is_wrong_is_named(case, tmp_path, capsys):
         ([tmp_path / "none", *rig], "none: no such file or folder"),
         ([case.tracks, "--config", tmp_path / "no.yaml"], "no.yaml"),
         ([case.tracks, "--config", without_camera], "imu.yaml: has 0 cameras, --camera is 0"),
+        ([case.log], "walk.lcm: does not tell the camera's calibration: give --config"),
         ([case.tracks, *rig, "--camera", 1], "rig.yaml: has 1 cameras, --camera is 1"),
         ([case.tracks, "--config", slow], "walk.tracks: a tracks file has no times: give --rate-hz"),
         ([broken, *rig], "broken.tracks:2"),
@@ -273,7 +394,6 @@ def test_what_is_wrong_is_named(case, tmp_path, capsys):
         ([case.log, *rig, "--sigma-px", 0], "0: must be a positive number"),
         ([case.log, *rig, "--camera", -1], "-1: must not be negative"),
         ([case.log, *rig, "--start-time", "noon"], "noon: must be seconds"),
-        ([case.log], "--config"),
     ):
         with pytest.raises(SystemExit) as ended:
             call(*arguments)

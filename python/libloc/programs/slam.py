@@ -1,14 +1,15 @@
 """loc-slam: where a camera was and what it saw, from features with identities; off line.
 
-INPUT is a tracks file (rows `frame feature dimension value`) or a recording with features (LCM log,
-loc-simulate's folder or log); its content tells. --config is the rig file with the camera's calibration.
+INPUT is a tracks file (rows `frame feature dimension value`) or a recording with features (LCM log, EqVIO's
+file of tracks and IMU); its content tells. --config is the rig file with the camera's calibration, which an
+EqVIO file brings along.
 
 mono-slam needs nothing but the camera: lengths are in a unit of their own then, and the world is where the
 camera began, which looks along x with z up. inertial-slam takes the recording's IMU as well: metres, and a
 world with z up. --output gets the trajectory (TUM, see --pose), the map (PLY), a CSV with a line for each
-frame, summary.txt and summary.json, and pictures. Where there is truth (--reference, or in the recording) the
-trajectory is compared with it after an alignment: similarity for a camera alone, rigid where lengths are
-metres.
+frame, summary.txt and summary.json, the settings (slam.yaml), the state to go on from (state.slam, see
+--map-in), and pictures. Where there is truth (--reference, or in the recording) the trajectory is compared
+with it after an alignment: similarity for a camera alone, rigid where lengths are metres.
 
 Exit codes: 0 done, 1 the data cannot be used (the message says why), 2 wrong options, 130 interrupted: what
 there was by then is written.
@@ -31,7 +32,7 @@ import numpy as np
 
 import libloc
 from libloc import DataError
-from libloc.programs.slam_input import METHODS, read_input, slam_options
+from libloc.programs.slam_input import METHODS, method_of, read_input, saved_state, slam_options
 from libloc.programs.slam_result import SlamResult, against_truth, report, text_of, write
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
@@ -71,11 +72,15 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--config",
         type=Path,
-        required=True,
         metavar="RIG",
         help="calibration of the sensors: rig.yaml, Kalibr's camchain, EuRoC's sensor.yaml",
     )
-    parser.add_argument("--method", choices=tuple(METHODS), default="mono-slam", help="(%(default)s)")
+    parser.add_argument(
+        "--method", choices=tuple(METHODS), help="(default: as --slam-config says, else mono-slam)"
+    )
+    parser.add_argument(
+        "--slam-config", type=Path, metavar="YAML", help="settings, names as in SlamOptions (slam.yaml)"
+    )
     parser.add_argument(
         "--camera", type=_index, default=0, metavar="N", help="index in the rig (%(default)s)"
     )
@@ -103,6 +108,9 @@ def make_parser() -> argparse.ArgumentParser:
         type=_seconds,
         metavar="S",
         help="of frame 0 of a tracks file, on the clock of --reference (default: 0)",
+    )
+    parser.add_argument(
+        "--map-in", type=Path, metavar="FILE", help="go on from the map and state (state.slam) of another run"
     )
     group = parser.add_argument_group("truth")
     group.add_argument(
@@ -187,10 +195,12 @@ def run(options: argparse.Namespace) -> SlamResult:
             f"loc-slam: warning: {options.config}: {block} ({verdict.name.lower()}): {sentence}",
             file=sys.stderr,
         )
-    slam = slam_options(options, given.rig)
+    slam = slam_options(options, given)
+    start_from = None if options.map_in is None else saved_state(options.map_in, slam)
     if slam.motion == libloc.SlamMotion.INERTIAL and given.rig.imu is None:
         print(
-            f"loc-slam: warning: {options.config}: no imu in it: its noise is a guess, it is not calibrated",
+            f"loc-slam: warning: {options.config or given.path}: no calibration of the IMU in it, "
+            "its noise is a guess",
             file=sys.stderr,
         )
     began = time.monotonic()
@@ -200,7 +210,7 @@ def run(options: argparse.Namespace) -> SlamResult:
             progress(done, total)
             return not interrupted()
 
-        ran = libloc.run_slam(given.recording, slam, rig=given.rig, progress=go_on)
+        ran = libloc.run_slam(given.recording, slam, rig=given.rig, start_from=start_from, progress=go_on)
     elapsed_s = time.monotonic() - began
     truth, failure = None, ""
     if given.reference is not None:
@@ -209,7 +219,7 @@ def run(options: argparse.Namespace) -> SlamResult:
         except DataError as error:
             failure = str(error)
     frames = int(np.sum(np.asarray(given.features.camera) == options.camera))
-    return SlamResult(given, options.method, slam, ran, frames, truth, failure, elapsed_s)
+    return SlamResult(given, method_of(slam), slam, ran, frames, truth, failure, elapsed_s)
 
 
 def _scale_unknown(ran: libloc.SlamRun) -> bool:

@@ -78,27 +78,39 @@ def _own_reference(path: Path, form: str, recording: libloc.Recording) -> Poses 
     )
 
 
-def _has_imu(recording: libloc.Recording | libloc.FrameFeatures) -> bool:
-    return isinstance(recording, libloc.Recording) and len(recording.imu.times_ns) > 0
+def _read_recording(
+    path: Path, form: str, rig: libloc.Rig | None, camera: int
+) -> tuple[libloc.Recording, libloc.Rig | None]:
+    """With the file's own camera where it has one and no rig is given."""
+    if form != "eqvio":
+        return libloc.read_recording(path), rig
+    source = libloc.open_eqvio(path, camera=None if rig is None else rig.cameras[camera])
+    return source.read_all(), source.rig if rig is None else rig
 
 
 def read_input(options: argparse.Namespace) -> SlamInput:
     """Raises DataError naming file, line, field and value."""
     path: Path = options.input
-    rig = libloc.read_any_rig(options.config)
-    if options.camera >= len(rig.cameras):
-        raise DataError(f"{options.config}: has {len(rig.cameras)} cameras, --camera is {options.camera}")
+    rig = None
+    if options.config is not None:
+        rig = libloc.read_any_rig(options.config)
+        if options.camera >= len(rig.cameras):
+            raise DataError(f"{options.config}: has {len(rig.cameras)} cameras, --camera is {options.camera}")
     form = libloc.file_format(path)
+    if rig is None and form != "eqvio":
+        raise DataError(f"{path}: does not tell the camera's calibration: give --config")
     if form == "tum" and _is_tracks_file(path):
+        assert rig is not None
         given = _read_tracks(path, options, options.rate_hz or rig.cameras[options.camera].rate_hz)
     else:
         for name in ("rate_hz", "start_time"):
             if getattr(options, name) is not None:
                 option = f"--{name.replace('_', '-')}"
                 raise DataError(f"{path}: is a recording with times of its own, {option} is for tracks files")
-        recording = libloc.read_recording(path)
+        recording, rig = _read_recording(path, form, rig, options.camera)
         reference = None if options.reference else _own_reference(path, form, recording)
         given = SlamInput(path, form, recording, rig, reference, recording.counts)
+    assert rig is not None
     given.rig = rig
     if not np.any(np.asarray(given.features.camera) == options.camera):
         cameras = sorted(set(given.features.camera.tolist()))
@@ -106,8 +118,6 @@ def read_input(options: argparse.Namespace) -> SlamInput:
         if isinstance(given.recording, libloc.Recording) and given.recording.images:
             held += f", and {given.recording.images} pictures, which are not searched for features"
         raise DataError(f"{path}: no features of camera {options.camera} in it; it holds {held}")
-    if options.method == "inertial-slam" and not _has_imu(given.recording):
-        raise DataError(f"{path}: no IMU samples in it, which {options.method} needs")
     if options.reference:
         given.reference = read_reference(options.reference)
         if not given.reference.has_position().any():
@@ -155,18 +165,45 @@ def set_option(options: SlamOptions, setting: str) -> None:
         raise ValueError(f"--set {setting}: {error}") from None
 
 
-def slam_options(options: argparse.Namespace, rig: libloc.Rig) -> SlamOptions:
-    """Camera and noise of the rig, what the command line says. Raises ValueError naming a field."""
+def slam_options(options: argparse.Namespace, given: SlamInput) -> SlamOptions:
+    """Noise of the rig, then the file of settings, then the command line; the camera is the rig's.
+
+    Raises DataError and ValueError naming a field.
+    """
     out = SlamOptions()
-    out.motion = METHODS[options.method]
-    out.camera = rig.cameras[options.camera]
+    if given.rig.imu is not None:
+        out.imu_noise = given.rig.imu.noise
+    if options.method is not None:
+        out.motion = METHODS[options.method]
+    if options.slam_config is not None:
+        out = libloc.read_slam_options(options.slam_config, out)
+        if options.method is not None and out.motion != METHODS[options.method]:
+            raise DataError(
+                f"{options.slam_config}: motion is another one than that of --method {options.method}"
+            )
+    out.camera = given.rig.cameras[options.camera]
     out.camera_index = options.camera
-    if rig.imu is not None:
-        out.imu_noise = rig.imu.noise
     if options.sigma_px is not None:
         out.sigma_px = options.sigma_px
         out.override_sigma = True
     for setting in options.set:
         set_option(out, setting)
     out.check()
+    recording = given.recording
+    has_imu = isinstance(recording, libloc.Recording) and len(recording.imu.times_ns) > 0
+    if out.motion == SlamMotion.INERTIAL and not has_imu:
+        raise DataError(f"{given.path}: no IMU samples in it, which inertial-slam needs")
     return out
+
+
+def method_of(options: SlamOptions) -> str:
+    return next(name for name, motion in METHODS.items() if motion == options.motion)
+
+
+def saved_state(path: Path, options: SlamOptions) -> libloc.SlamSnapshot:
+    """Raises DataError when it cannot be read, or was made with another camera or motion."""
+    file = libloc.load_slam(path)
+    why = file.why_not_restorable(options)
+    if why:
+        raise DataError(f"--map-in {path}: {why}")
+    return file.snapshot

@@ -281,32 +281,20 @@ def write_frames(run: SlamRun, path: Path) -> None:
         file.writelines(",".join(row) + "\n" for row in zip(*cells, strict=True))
 
 
-def write_map(run: SlamRun, path: Path) -> int:
-    """PLY (ASCII): x y z, id, sigma (largest deviation in any direction), number of measurements.
+def write_map(result: SlamResult, path: Path) -> int:
+    """PLY: x y z, id, sigma (largest deviation in any direction).
 
-    Returns the number of points; those without a place are left out. Identities are written as doubles where
-    PLY's 32 bits do not hold them.
+    Returns how many were left out: those of which the place is not known.
     """
-    map_ = run.map
+    map_ = result.run.map
+    fits = np.abs(map_.id) < 2**31
+    comments = ["world, z up [m]" if result.metric else "world of the start, unit of its own"]
+    if not fits.all():
+        comments.append("identities of more than 32 bit are -1")
     sigma = sigma_of_points(map_.position_cov)
-    rows = np.flatnonzero(np.isfinite(map_.position).all(axis=1) & np.isfinite(sigma))
-    small = bool(np.all(np.abs(map_.id[rows]) < 2**31))
-    lines = [
-        "ply",
-        "format ascii 1.0",
-        "comment map of loc-slam, in world",
-        f"element vertex {len(rows)}",
-        *(f"property double {axis}" for axis in "xyz"),
-        f"property {'int' if small else 'double'} id",
-        "property double sigma",
-        "property int measured",
-        "end_header",
-    ]
-    for k in rows:
-        place = " ".join(repr(v) for v in map_.position[k].tolist())
-        lines.append(f"{place} {int(map_.id[k])} {float(sigma[k])!r} {int(map_.measured[k])}")
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return len(rows)
+    return libloc.write_ply(
+        path, map_.position, np.where(fits, map_.id, -1), sigma, comments=comments, ascii=True
+    )
 
 
 def write_trajectory(run: SlamRun, pose: str, path: Path) -> None:
@@ -331,7 +319,9 @@ def write(result: SlamResult, out: dict[str, Any], pose: str, pictures: bool, fo
     for name, function in (
         ("trajectory.tum", lambda path: write_trajectory(result.run, pose, path)),
         ("frames.csv", lambda path: write_frames(result.run, path)),
-        ("map.ply", lambda path: write_map(result.run, path)),
+        ("map.ply", lambda path: write_map(result, path)),
+        ("slam.yaml", lambda path: libloc.write_slam_options(path, result.options)),
+        ("state.slam", lambda path: libloc.save_slam(path, result.run.snapshot, result.options)),
     ):
         function(folder / name)
         paths.append(folder / name)
