@@ -22,6 +22,8 @@ _REFERENCE, _ESTIMATE, _MAP, _OTHER = "0.55", "tab:blue", "tab:orange", "tab:gre
 _AXES = ("x", "y", "z")
 # Of a point's deviation to its distance from the cameras: those known worse say nothing in a picture.
 _SHOWN_BELOW = 0.3
+# Of their distance to the usual one.
+_SHOWN_WITHIN = 4
 _GAP = 5  # a step of time so many times the usual one is a hole in a line
 
 
@@ -57,6 +59,12 @@ class _Scene:
         for k in np.flatnonzero(good):
             nearest[k] = np.min(np.linalg.norm(cameras - run.map.position[k], axis=1))
         good &= sigma < _SHOWN_BELOW * nearest
+        if good.any():
+            # A few points at the horizon must not make everything else small.
+            middle = self.path.mean(axis=0)
+            away = np.linalg.norm(run.map.position - middle, axis=1)
+            size = np.linalg.norm(self.path - middle, axis=1).max()
+            good &= away < _SHOWN_WITHIN * max(size, float(np.median(away[good])))
         self.left_out = int(np.sum(~good))
         self.points = run.map.position[good]
         self.point_cov = run.map.position_cov[good]
@@ -78,7 +86,7 @@ class _Scene:
         return float(max((self.high - self.low).max(), 1e-6))
 
     def map_label(self) -> str:
-        rest = f"; {self.left_out} known less well are not shown" if self.left_out else ""
+        rest = f"; {self.left_out} far or known less well are not shown" if self.left_out else ""
         return f"map at the end, {len(self.points)} points with 1 sigma{rest}"
 
 
@@ -109,11 +117,17 @@ def _title(result: SlamResult) -> str:
 def plot_top(result: SlamResult, path: Path) -> None:
     """Path and map from above, and from the side."""
     scene = _Scene(result)
-    spans = np.maximum(scene.high - scene.low, 0.05 * scene.size)
-    # Panels as high as their shape asks for, within what is pleasant to look at.
-    heights = np.clip(10 * spans[1:] / spans[0], 1.8, 8.0)
-    figure = _figure(10, float(heights.sum()) + 1.8)
+    spans = 1.1 * np.maximum(scene.high - scene.low, 0.05 * scene.size)
+    centre = (scene.low + scene.high) / 2
+    # One scale for all axes, by which both panels hold everything and are pleasant to look at.
+    width = 9.0
+    per_inch = max(spans[0] / width, spans[1] / 8, spans[2] / 6)
+    heights = np.maximum(spans[1:] / per_inch, 1.5)
+    figure = _figure(width + 1, float(heights.sum()) + 2)
     panels = figure.subplots(2, 1, sharex=True, height_ratios=heights)
+    panels[0].set_xlim(centre[0] - width / 2 * per_inch, centre[0] + width / 2 * per_inch)
+    for axes, height, middle in zip(panels, heights, centre[1:], strict=True):
+        axes.set_ylim(middle - height / 2 * per_inch, middle + height / 2 * per_inch)
     for axes, (h, v) in zip(panels, ((0, 1), (0, 2)), strict=True):
         if scene.reference is not None:
             axes.plot(scene.reference[:, h], scene.reference[:, v], color=_REFERENCE, lw=3, label="truth")
@@ -132,7 +146,7 @@ def plot_top(result: SlamResult, path: Path) -> None:
         axes.plot(*scene.path[0, [h, v]], "o", color="k", ms=5, label="start")
         axes.plot(*scene.path[-1, [h, v]], "X", color="k", ms=7, label="end")
         axes.set_ylabel(f"{_AXES[v]} [{scene.unit}]")
-        axes.set_aspect("equal", adjustable="datalim")
+        axes.set_aspect("equal", adjustable="box")
         axes.grid(alpha=0.3)
     panels[0].set_title("from above", fontsize=10)
     panels[1].set_title("from the side", fontsize=10)
@@ -162,7 +176,7 @@ def plot_space(result: SlamResult, path: Path) -> None:
     centre = (scene.low + scene.high) / 2
     for k, name in enumerate(_AXES):
         getattr(axes, f"set_{name}lim")(centre[k] - 0.5 * spans[k], centre[k] + 0.5 * spans[k])
-        getattr(axes, f"set_{name}label")(f"{name} [{scene.unit}]")
+        getattr(axes, f"set_{name}label")(f"{name} [{scene.unit}]", labelpad=8)
         getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(max(2, round(6 * spans[k] / scene.size))))
     axes.set_box_aspect(spans, zoom=1.15)
     for artist in (*axes.lines, *axes.collections):
