@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 import signal
 import sys
 from contextlib import contextmanager
@@ -347,6 +348,24 @@ def test_pictures(case, tmp_path, capsys, method, own):
         assert min(picture.shape[:2]) > 400
         coloured = np.ptp(picture[..., :3], axis=2) > 0.2
         assert 100 < coloured.sum() < 0.5 * coloured.size
+
+
+def test_what_was_left_out_is_said(case, tmp_path, capsys):
+    """A pause of a second and a half, and a line that was cut."""
+    lines = [x for x in case.tracks.read_text().splitlines(keepends=True) if not x.startswith("#")]
+    kept = [line for line in lines if not 60 <= int(line.split()[0]) < 90]
+    path = tmp_path / "gap.tracks"
+    path.write_text("".join(kept)[:-2])
+    assert call(path, "--config", case.rig, "--output", tmp_path / "out", "--no-plots") == 0
+    text = capsys.readouterr().out
+    assert f"{FRAMES - 30} used of {FRAMES - 30}" in text
+    assert "tracks.skipped.no_line_end 1" in text
+    assert "gaps 1" in text
+    line = next(x for x in text.splitlines() if x.startswith("status"))
+    assert re.search(r"\bgap 1,", line)
+    assert f"scale_unknown {FRAMES - 30}" in line
+    status = table(tmp_path / "out/frames.csv")["status"].astype(int)
+    assert list(np.flatnonzero(status & libloc.EstimateStatus.GAP)) == [60]
 
 
 def test_what_is_wrong_is_named(case, tmp_path, capsys):

@@ -187,6 +187,25 @@ def report(result: SlamResult) -> dict[str, Any]:
     return out
 
 
+# Of what was read and of what the estimator did: what somebody should know of when it is not zero.
+_TROUBLE = (
+    "skipped",
+    "not_increasing",
+    "not_usable",
+    "ambiguous",
+    "failed",
+    "gap",
+    "set_back",
+    "cut",
+    "damage",
+)
+
+
+def _troubles(out: dict[str, Any]) -> list[str]:
+    counts = out["input"]["counts"] | out["estimator"]
+    return [f"{name} {n}" for name, n in counts.items() if n and any(word in name for word in _TROUBLE)]
+
+
 def text_of(out: dict[str, Any]) -> str:
     lines = []
 
@@ -197,6 +216,8 @@ def text_of(out: dict[str, Any]) -> str:
     line("input", f"{out['input']['file']} ({out['input']['format']})")
     ending = "" if out["finished"] else ": interrupted, this is what there was"
     line("frames", f"{frames['used']} used of {frames['in_input']}{ending}")
+    if _troubles(out):
+        line("", ", ".join(_troubles(out)))
     if "map" not in out:
         return "\n".join(lines)
     unit = "m" if out["metric"] else "units of its own: one camera cannot tell metres"
