@@ -5,6 +5,7 @@
 #include <pybind11/stl.h>
 
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -190,8 +191,8 @@ void bind_slam_options_struct(py::module_& m) {
   vector_property(c, "position", &O::position, "Start: of body in world (3,) (X_cam) [m].");
   c.def_property(
       "q_world_body_wxyz",
-      [](const O& o) -> py::object {
-        if (!o.q_world_body) return py::none();
+      [](const O& o) -> std::optional<py::array_t<double>> {
+        if (!o.q_world_body) return std::nullopt;
         return to_wxyz(*o.q_world_body);
       },
       [](O& o, const std::optional<ArrayLike>& q) {

@@ -255,6 +255,9 @@ def test_settings_of_a_file_and_a_map_to_go_on_from(case, tmp_path, capsys):
     ):
         assert call(case.log, *base, *arguments) == 1
         assert message in capsys.readouterr().err
+    settings.write_text("format: libloc-slam-1\ncamera_index: 1\n")
+    assert call(case.log, "--config", case.rig, "--slam-config", settings) == 1
+    assert "rig.yaml: has 1 cameras, the one asked for is 1" in capsys.readouterr().err
     settings.write_text("format: libloc-slam-1\nmap:\n  most_features: 44\n")
     assert call(case.log, "--config", case.rig, "--slam-config", settings) == 1
     error = capsys.readouterr().err
@@ -387,9 +390,9 @@ def test_what_is_wrong_is_named(case, tmp_path, capsys):
     for arguments, message in (
         ([tmp_path / "none", *rig], "none: no such file or folder"),
         ([case.tracks, "--config", tmp_path / "no.yaml"], "no.yaml"),
-        ([case.tracks, "--config", without_camera], "imu.yaml: has 0 cameras, --camera is 0"),
+        ([case.tracks, "--config", without_camera], "imu.yaml: has 0 cameras, the one asked for is 0"),
         ([case.log], "walk.lcm: does not tell the camera's calibration: give --config"),
-        ([case.tracks, *rig, "--camera", 1], "rig.yaml: has 1 cameras, --camera is 1"),
+        ([case.tracks, *rig, "--camera", 1], "rig.yaml: has 1 cameras, the one asked for is 1"),
         ([case.tracks, "--config", slow], "walk.tracks: a tracks file has no times: give --rate-hz"),
         ([broken, *rig], "broken.tracks:2"),
         ([case.truth, *rig], "holds no measurements"),

@@ -82,7 +82,7 @@ def make_parser() -> argparse.ArgumentParser:
         "--slam-config", type=Path, metavar="YAML", help="settings, names as in SlamOptions (slam.yaml)"
     )
     parser.add_argument(
-        "--camera", type=_index, default=0, metavar="N", help="index in the rig (%(default)s)"
+        "--camera", type=_index, metavar="N", help="index in the rig (default: that of --slam-config, else 0)"
     )
     parser.add_argument(
         "--set",
@@ -95,7 +95,7 @@ def make_parser() -> argparse.ArgumentParser:
         "--sigma-px",
         type=_positive,
         metavar="PX",
-        help="deviation of a measured coordinate (default: what the recording says, else 1)",
+        help="deviation of a measured coordinate (default: what the recording says, else that of the settings)",
     )
     parser.add_argument(
         "--rate-hz",
@@ -189,6 +189,11 @@ def _interrupt() -> Iterator[Callable[[], bool]]:
 
 def run(options: argparse.Namespace) -> SlamResult:
     """Raises DataError (ValueError) for data or options that cannot be used."""
+    if options.camera is None:
+        settings = libloc.SlamOptions()
+        if options.slam_config is not None:
+            settings = libloc.read_slam_options(options.slam_config)
+        options.camera = settings.camera_index
     given = read_input(options)
     for block, verdict, sentence in given.rig.doubts():
         print(

@@ -95,7 +95,9 @@ def read_input(options: argparse.Namespace) -> SlamInput:
     if options.config is not None:
         rig = libloc.read_any_rig(options.config)
         if options.camera >= len(rig.cameras):
-            raise DataError(f"{options.config}: has {len(rig.cameras)} cameras, --camera is {options.camera}")
+            raise DataError(
+                f"{options.config}: has {len(rig.cameras)} cameras, the one asked for is {options.camera}"
+            )
     form = libloc.file_format(path)
     if rig is None and form != "eqvio":
         raise DataError(f"{path}: does not tell the camera's calibration: give --config")
