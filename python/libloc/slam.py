@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from libloc._core import (
     FeaturesArrays,
+    ImuArrays,
     InertialSlam,
     MeasurementSource,
     MonoSlam,
@@ -90,6 +91,7 @@ def run_slam(
     recording: Recording | FeaturesArrays | FrameFeatures | MeasurementSource | str | PathLike[str],
     options: SlamOptions,
     *,
+    imu: ImuArrays | None = None,
     rig: Rig | None = None,
     start_from: SlamSnapshot | None = None,
     progress: Callable[[int, int], bool | None] | None = None,
@@ -98,10 +100,10 @@ def run_slam(
 ) -> SlamRun:
     """Runs the estimator that options.motion names over a recording; other cameras' frames are passed over.
 
-    rig: its calibration is applied to the IMU. start_from: goes on from there, see restore().
-    progress(frames done, frames in all) is called a few times in a second; when it returns False the run
-    ends, with what there is. Raises ValueError when the recording lacks what the estimator needs; DataError
-    when it cannot be read.
+    imu: in place of the recording's. rig: its calibration is applied to the IMU. start_from: goes on from
+    there, see restore(). progress(frames done, frames in all) is called a few times in a second; when it
+    returns False the run ends, with what there is. Raises ValueError when the recording lacks what the
+    estimator needs; DataError when it cannot be read.
     """
     if isinstance(recording, MeasurementSource):
         recording = recording.read_all()
@@ -123,7 +125,8 @@ def run_slam(
         if start_from is not None:
             mono.restore(start_from)
         return mono.run(*frames, **settings)
-    imu = recording.imu if isinstance(recording, Recording) else None
+    if imu is None and isinstance(recording, Recording):
+        imu = recording.imu
     if imu is None or len(imu.times_ns) == 0:
         raise ValueError("the recording has no IMU samples, which InertialSlam needs")
     gyro, force = imu.angular_velocity, imu.specific_force

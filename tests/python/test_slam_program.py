@@ -265,6 +265,30 @@ def test_settings_of_a_file_and_a_map_to_go_on_from(case, tmp_path, capsys):
     assert "most_features" in error
 
 
+def test_tracks_beside_a_recording_without_features(case, tmp_path, capsys):
+    imu, out = case.recording.imu, tmp_path / "out"
+    path = tmp_path / "imu.csv"
+    rows = ["time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"]
+    for time_ns, w, f in zip(imu.times_ns, imu.angular_velocity, imu.specific_force, strict=True):
+        rows.append(f"{time_ns}," + ",".join(repr(x) for x in (*w.tolist(), *f.tolist())))
+    path.write_text("\n".join(rows) + "\n")
+    base = [path, "--config", case.rig, "--method", "inertial-slam", "--sigma-px", 0.5, "--no-plots"]
+    tracks = ["--tracks", case.tracks, "--start-time", START_NS // 10**9]
+    assert call(*base, *tracks, "--reference", case.truth, "--output", out) == 0
+    beside = table(out / "frames.csv")
+    assert call(case.log, *base[1:], "--output", out) == 0
+    log = table(out / "frames.csv")
+    assert np.allclose(beside["px_m"], log["px_m"], rtol=0, atol=1e-6)
+    capsys.readouterr()
+    for arguments, message in (
+        (base, "imu.csv: no features of camera 0 in it; it holds none at all (--tracks takes"),
+        ([*base, "--tracks", case.tracks], "walk.tracks: a tracks file has no times: give --start-time"),
+        ([case.tracks, *base[1:], *tracks], "walk.tracks: is a tracks file, --tracks is for recordings"),
+    ):
+        assert call(*arguments) == 1
+        assert message in capsys.readouterr().err
+
+
 def test_a_file_that_brings_its_camera(case, tmp_path, capsys):
     """An EqVIO file needs no rig: the same tracks as points without distortion."""
     features, imu = case.recording.features, case.recording.imu

@@ -1,7 +1,8 @@
 """loc-slam: where a camera was and what it saw, from features with identities; off line.
 
 INPUT is a tracks file (rows `frame feature dimension value`) or a recording with features (LCM log, EqVIO's
-file of tracks and IMU); its content tells. --config is the rig file with the camera's calibration, which an
+file of tracks and IMU); its content tells. A recording without features (EuRoC folder, CSV) gives IMU and
+truth where --tracks has the features. --config is the rig file with the camera's calibration, which an
 EqVIO file brings along.
 
 mono-slam needs nothing but the camera: lengths are in a unit of their own then, and the world is where the
@@ -95,7 +96,10 @@ def make_parser() -> argparse.ArgumentParser:
         "--sigma-px",
         type=_positive,
         metavar="PX",
-        help="deviation of a measured coordinate (default: what the recording says, else that of the settings)",
+        help="deviation of a measured coordinate (default: what the recording or else the settings say)",
+    )
+    parser.add_argument(
+        "--tracks", type=Path, metavar="FILE", help="tracks file with the features of a recording"
     )
     parser.add_argument(
         "--rate-hz",
@@ -107,7 +111,7 @@ def make_parser() -> argparse.ArgumentParser:
         "--start-time",
         type=_seconds,
         metavar="S",
-        help="of frame 0 of a tracks file, on the clock of --reference (default: 0)",
+        help="of frame 0 of a tracks file, on the clock of the recording or --reference (default: 0)",
     )
     parser.add_argument(
         "--map-in", type=Path, metavar="FILE", help="go on from the map and state (state.slam) of another run"
@@ -215,7 +219,9 @@ def run(options: argparse.Namespace) -> SlamResult:
             progress(done, total)
             return not interrupted()
 
-        ran = libloc.run_slam(given.recording, slam, rig=given.rig, start_from=start_from, progress=go_on)
+        ran = libloc.run_slam(
+            given.features, slam, imu=given.imu, rig=given.rig, start_from=start_from, progress=go_on
+        )
     elapsed_s = time.monotonic() - began
     truth, failure = None, ""
     if given.reference is not None:

@@ -22,16 +22,11 @@ METHODS = {"mono-slam": SlamMotion.CONSTANT_VELOCITY, "inertial-slam": SlamMotio
 class SlamInput:
     path: Path
     form: str  # "tracks", or as libloc.file_format names it
-    recording: libloc.Recording | libloc.FrameFeatures
+    features: libloc.FeaturesArrays | libloc.FrameFeatures
+    imu: libloc.ImuArrays | None
     rig: libloc.Rig
     reference: Poses | None
     counts: dict[str, int] = field(default_factory=dict)  # what was read and skipped, and why
-
-    @property
-    def features(self) -> libloc.FeaturesArrays | libloc.FrameFeatures:
-        if isinstance(self.recording, libloc.Recording):
-            return self.recording.features
-        return self.recording
 
 
 def _is_tracks_file(path: Path) -> bool:
@@ -44,7 +39,10 @@ def _is_tracks_file(path: Path) -> bool:
     return False
 
 
-def _read_tracks(path: Path, options: argparse.Namespace, rate_hz: float) -> SlamInput:
+def _read_tracks(
+    path: Path, options: argparse.Namespace, rig: libloc.Rig
+) -> tuple[libloc.FrameFeatures, dict[str, int]]:
+    rate_hz = options.rate_hz or rig.cameras[options.camera].rate_hz
     if not rate_hz > 0:
         raise DataError(
             f"{path}: a tracks file has no times: give --rate-hz, or rate_hz of the camera in --config"
@@ -58,7 +56,7 @@ def _read_tracks(path: Path, options: argparse.Namespace, rate_hz: float) -> Sla
         start_time_ns=options.start_time or 0,
         camera=options.camera,
     )
-    return SlamInput(path, "tracks", features, libloc.Rig(), None, counts)
+    return features, counts
 
 
 def _own_reference(path: Path, form: str, recording: libloc.Recording) -> Poses | None:
@@ -80,9 +78,10 @@ def _own_reference(path: Path, form: str, recording: libloc.Recording) -> Poses 
 
 def _read_recording(
     path: Path, form: str, rig: libloc.Rig | None, camera: int
-) -> tuple[libloc.Recording, libloc.Rig | None]:
+) -> tuple[libloc.Recording, libloc.Rig]:
     """With the file's own camera where it has one and no rig is given."""
     if form != "eqvio":
+        assert rig is not None
         return libloc.read_recording(path), rig
     source = libloc.open_eqvio(path, camera=None if rig is None else rig.cameras[camera])
     return source.read_all(), source.rig if rig is None else rig
@@ -101,24 +100,41 @@ def read_input(options: argparse.Namespace) -> SlamInput:
     form = libloc.file_format(path)
     if rig is None and form != "eqvio":
         raise DataError(f"{path}: does not tell the camera's calibration: give --config")
+    images = 0
     if form == "tum" and _is_tracks_file(path):
         assert rig is not None
-        given = _read_tracks(path, options, options.rate_hz or rig.cameras[options.camera].rate_hz)
+        if options.tracks is not None:
+            raise DataError(f"{path}: is a tracks file, --tracks is for recordings")
+        features, counts = _read_tracks(path, options, rig)
+        given = SlamInput(path, "tracks", features, None, rig, None, counts)
     else:
-        for name in ("rate_hz", "start_time"):
-            if getattr(options, name) is not None:
-                option = f"--{name.replace('_', '-')}"
-                raise DataError(f"{path}: is a recording with times of its own, {option} is for tracks files")
         recording, rig = _read_recording(path, form, rig, options.camera)
         reference = None if options.reference else _own_reference(path, form, recording)
-        given = SlamInput(path, form, recording, rig, reference, recording.counts)
-    assert rig is not None
-    given.rig = rig
+        given = SlamInput(path, form, recording.features, recording.imu, rig, reference, recording.counts)
+        images = recording.images
+        if options.tracks is not None:
+            if options.start_time is None:
+                raise DataError(
+                    f"{options.tracks}: a tracks file has no times: give --start-time, on the clock of {path}"
+                )
+            given.features, counts = _read_tracks(options.tracks, options, rig)
+            given.counts |= counts
+        else:
+            for name in ("rate_hz", "start_time"):
+                if getattr(options, name) is not None:
+                    option = f"--{name.replace('_', '-')}"
+                    raise DataError(
+                        f"{path}: is a recording with times of its own, {option} is for tracks files"
+                    )
     if not np.any(np.asarray(given.features.camera) == options.camera):
         cameras = sorted(set(given.features.camera.tolist()))
-        held = f"those of cameras {cameras}" if cameras else "none at all"
-        if isinstance(given.recording, libloc.Recording) and given.recording.images:
-            held += f", and {given.recording.images} pictures, which are not searched for features"
+        held = (
+            f"those of cameras {cameras}"
+            if cameras
+            else "none at all (--tracks takes them from another file)"
+        )
+        if images:
+            held += f", and {images} pictures, which are not searched for features"
         raise DataError(f"{path}: no features of camera {options.camera} in it; it holds {held}")
     if options.reference:
         given.reference = read_reference(options.reference)
@@ -191,9 +207,7 @@ def slam_options(options: argparse.Namespace, given: SlamInput) -> SlamOptions:
     for setting in options.set:
         set_option(out, setting)
     out.check()
-    recording = given.recording
-    has_imu = isinstance(recording, libloc.Recording) and len(recording.imu.times_ns) > 0
-    if out.motion == SlamMotion.INERTIAL and not has_imu:
+    if out.motion == SlamMotion.INERTIAL and (given.imu is None or len(given.imu.times_ns) == 0):
         raise DataError(f"{given.path}: no IMU samples in it, which inertial-slam needs")
     return out
 
