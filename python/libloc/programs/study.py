@@ -18,14 +18,14 @@ from pathlib import Path
 
 import libloc
 from libloc import DataError
-from libloc.programs import study_vio
+from libloc.programs import study_monoslam, study_vio
 from libloc.programs.study_runner import StudyError, cores, progress, results
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
 # A study is a module with NAME, HELP, add_options, tasks, run (one task, in whatever process), evaluate (of
 # tasks and results in any order), text_of and write.
-_STUDIES = {study.NAME: study for study in (study_vio,)}
+_STUDIES = {study.NAME: study for study in (study_monoslam, study_vio)}
 
 
 def _positive(text: str) -> int:
