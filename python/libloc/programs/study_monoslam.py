@@ -1,10 +1,10 @@
 """loc-study monoslam: how good SLAM with one camera is, alone and with an IMU, over many seeds.
 
 Five tables: the simulation of K. Popov, "Monocular simultaneous location and mapping based on recursive
-filtering" (2015, section 5.1) with and without noise; several levels of noise; one setting at a time away from
-the base; NEES and NIS of the three treatments of consistency; and what bad tracks do. With --out also as CSV and
-JSON, with pictures. Position errors are in metres and not aligned: the start is given, and known landmarks or the
-IMU give the unit of lengths, but for the rows that say that there is no landmark.
+filtering" (2015, section 5.1) with and without noise; several levels of noise; one setting at a time away
+from the base; NEES and NIS of the three treatments of consistency; and what bad tracks do. With --out also as
+CSV and JSON, with pictures. Position errors are in metres and not aligned: the start is given, and known
+landmarks or the IMU give the unit of lengths, but for the rows that say that there is no landmark.
 """
 
 from __future__ import annotations
@@ -70,9 +70,7 @@ class Study:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--quick", action="store_true", help="10 s of each path, only the ends of each sweep"
-    )
+    parser.add_argument("--quick", action="store_true", help="10 s of each path, only the ends of each sweep")
     parser.add_argument(
         "--rows", nargs="+", default=[], metavar="NAME", help="rows or tables to compute (default: all)"
     )
@@ -163,9 +161,7 @@ def evaluate(
             outcomes.setdefault(name, {})[task.seed] = outcome
     cases = [case for case in selected(options.rows, options.quick) if case.name in outcomes]
     runs = {case.name: [outcomes[case.name][seed] for seed in sorted(outcomes[case.name])] for case in cases}
-    consistency = {
-        case.name: _nees(case, runs[case.name]) for case in cases if case.table == "consistency"
-    }
+    consistency = {case.name: _nees(case, runs[case.name]) for case in cases if case.table == "consistency"}
     worlds = sorted({case.group for case in cases if case.table == "consistency"})
     common = set.intersection(*(set(of_case) for of_case in outcomes.values())) if outcomes else set()
     return Study(
@@ -183,15 +179,16 @@ def evaluate(
 def _errors_text(rows: list[CaseSummary]) -> list[str]:
     width = max(len(one.case.label) for one in rows)
     lines = [
-        f"{'':{width}}  runs  {'position RMS, m (median, min-max)':>36}  settled  turned, deg  map, m  NIS/dim  lost"
+        f"{'':{width}}  runs  {'position RMS, m (median, min-max)':>36}  settled  turned, deg  map, m  "
+        "NIS/dim  lost"
     ]
     for one in rows:
         figures = f"{one.rms.mean:.3f} ({one.median_m:.3f}, {one.rms.minimum:.3f}-{one.rms.maximum:.3f})"
         settled = "-" if one.settled_rms is None else f"{one.settled_rms.mean:.3f}"
         of_map = "-" if one.map_rms is None else f"{one.map_rms.mean:.3f}"
         lines.append(
-            f"{one.case.label:{width}}  {one.rms.runs:4d}  {figures:>36}  {settled:>7}  {one.turned_deg:11.2f}  "
-            f"{of_map:>6}  {one.nis_per_dim:7.3f}  {one.diverged:4d}"
+            f"{one.case.label:{width}}  {one.rms.runs:4d}  {figures:>36}  {settled:>7}  {one.turned_deg:11.2f}"
+            f"  {of_map:>6}  {one.nis_per_dim:7.3f}  {one.diverged:4d}"
         )
     return lines
 
@@ -217,8 +214,8 @@ def _consistency_text(study: Study) -> list[str]:
     ]
     if study.recommended is not None:
         lines.append(
-            f"  Nearest to right by the medians of position and orientation: {study.recommended}; the default "
-            f"is {_default_consistency()}."
+            f"  Nearest to right by the medians of position and orientation: {study.recommended}; the "
+            f"default is {_default_consistency()}."
         )
     return lines
 
@@ -330,8 +327,8 @@ def _write_rows(study: Study, path: Path) -> None:
     with path.open("w", newline="") as file:
         table = csv.writer(file)
         table.writerow(
-            "row table group runs rms_mean_m rms_median_m rms_min_m rms_max_m settled_rms_m orientation_rms_deg "
-            "map_rms_m nis_per_dim nis_per_dim_expected nees_position nees_orientation diverged".split()
+            "row table group runs rms_mean_m rms_median_m rms_min_m rms_max_m settled_rms_m "
+            "orientation_rms_deg map_rms_m nis_per_dim nis_per_dim_expected nees_position nees_orientation diverged".split()
         )
         for one in study.rows:
             nees = study.consistency.get(one.case.name)

@@ -1,14 +1,15 @@
 """Rows of the study of SLAM with one camera: what is simulated, which settings the filter has.
 
 Tables:
-  document     the look-at path with 0 and 1 px of noise, the filter told 1 px in both: with known landmarks (metres),
-               and without any, where the unit of lengths is that of the prior of depths
+  document     the look-at path with 0 and 1 px of noise, the filter told 1 px in both: with known landmarks
+               (metres), and without any, where the unit of lengths is that of the prior of depths
   noise        the same path, known landmarks, several levels of noise; the filter is told what is true
   sweep        one setting at a time away from the base of the look-at path
-  consistency  Civera's circle, the look-at path, and a device in the hand with an IMU: the three treatments of
-               SlamOptions.consistency, and the default one without gate and RANSAC (associations are all right)
-  robustness   circle and hand-held as they are, with 10 % of the observations anywhere, 20 % of the frames missing,
-               and 2 s without a feature
+  consistency  Civera's circle, the look-at path, and a device in the hand with an IMU: the three treatments
+               of SlamOptions.consistency, and the default one without gate and RANSAC (the simulated
+               associations are all right)
+  robustness   circle and hand-held as they are, with 10 % of the observations anywhere, 20 % of the frames
+               missing, and 2 s without a feature
 Rows of one seed see the same noise but for what their worlds change.
 """
 
@@ -41,12 +42,15 @@ SPOILT = {
 }
 
 
+_LOOK_AT_WORLD = World()
+
+
 @dataclass(frozen=True)
 class Case:
     name: str  # for --rows and files
     label: str
     table: str
-    world: World = World()
+    world: World = _LOOK_AT_WORLD
     settings: Settings = ()  # of SlamOptions, away from its defaults
     landmarks: int = LOOK_AT_LANDMARKS  # known features of the first frame
     motion_known: bool = False  # the filter is told the true velocities of the start
@@ -85,7 +89,12 @@ def _document() -> list[Case]:
         ("document", "as published: no landmark, depth 1", _DOCUMENT_PRIOR, 0),
         ("prior", "no landmark, default depth", (), 0),
         ("metric", f"{LOOK_AT_LANDMARKS} known landmarks", (), LOOK_AT_LANDMARKS),
-        ("cautious", f"{LOOK_AT_LANDMARKS} known landmarks, R = 3 px", (("sigma_px", 3.0),), LOOK_AT_LANDMARKS),
+        (
+            "cautious",
+            f"{LOOK_AT_LANDMARKS} known landmarks, R = 3 px",
+            (("sigma_px", 3.0),),
+            LOOK_AT_LANDMARKS,
+        ),
     ):
         for sigma_px in (0.0, 1.0):
             out.append(
@@ -142,7 +151,15 @@ def _sweep(quick: bool) -> list[Case]:
 
     out = []
     for f in ends(_FOCAL_PX):
-        out.append(replace(base, name=f"focal-{f:g}", label=f"{f:g}", world=World(focal_px=f), group="focal length, 640 x 480 [px]"))
+        out.append(
+            replace(
+                base,
+                name=f"focal-{f:g}",
+                label=f"{f:g}",
+                world=World(focal_px=f),
+                group="focal length, 640 x 480 [px]",
+            )
+        )
     for size in ends(_SIZES):
         world = World(size_px=size, focal_px=450.0 * size[0] / 640)
         group = "width, same field of view [px]"
@@ -150,7 +167,7 @@ def _sweep(quick: bool) -> list[Case]:
     for setting, group, values in _SWEEPS:
         for value in ends(values):
             name = f"{setting.rpartition('.')[2].replace('_', '-')}-{value:g}"
-            changed = tuple(one for one in base.settings if one[0] != setting) + ((setting, value),)
+            changed = (*(one for one in base.settings if one[0] != setting), (setting, value))
             out.append(replace(base, name=name, label=f"{value:g}", settings=changed, group=group))
     return out
 
@@ -232,7 +249,7 @@ def all_cases(quick: bool = False) -> list[Case]:
 
 
 def selected(names: list[str], quick: bool = False) -> list[Case]:
-    """Rows by their names or those of their tables; all for none. Raises StudyError naming what is not known."""
+    """Rows by their names or those of their tables; all for none. Raises StudyError naming what is unknown."""
     cases = all_cases(quick)
     for name in names:
         if name not in TABLES and all(case.name != name for case in cases):

@@ -1,8 +1,8 @@
-"""What the study of SLAM with one camera simulates: worlds with their cameras, and how their tracks are spoilt.
+"""What the study of SLAM with one camera simulates: worlds with their cameras, and how tracks are spoilt.
 
 Worlds:
-  look-at    a camera passes way-points and looks at given points (Popov 2015, 3.1), 20 s at 30 Hz, on its way past
-             a cloud of points; the seed draws the cloud
+  look-at    a camera passes way-points and looks at given points (Popov 2015, 3.1), 20 s at 30 Hz, before a
+             cloud of points that the seed draws
   circle     Civera's simulation: a circle of r = 3 m looking outward, 1000 frames at 30 Hz are two rounds,
              320 x 240 pixels, f = 195; points from 4.5 to 8 m from its middle, about 15 of them in view
   others     the scenarios of libloc, with their IMU and camera: what an estimator takes for noise is noise
@@ -29,7 +29,14 @@ LOOK_AT_POINTS = 80
 RATE_HZ = 30.0
 # Times [s], places and points looked at [m] of the look-at path: forward, a bend, and back.
 _TIMES = (0.0, 4.0, 8.0, 12.0, 16.0, 20.0)
-_PLACES = ((0, 0, 1.5), (1.2, 1.0, 1.6), (1.8, -0.6, 1.3), (0.6, -1.5, 1.5), (-0.4, 0.2, 1.7), (0.8, 1.0, 1.4))
+_PLACES = (
+    (0, 0, 1.5),
+    (1.2, 1.0, 1.6),
+    (1.8, -0.6, 1.3),
+    (0.6, -1.5, 1.5),
+    (-0.4, 0.2, 1.7),
+    (0.8, 1.0, 1.4),
+)
 _TARGETS = ((6, 0, 1.5), (6, 1.5, 1.6), (6, -0.5, 1.3), (6, -1.5, 1.6), (6, 0.5, 1.5), (6, 0.8, 1.4))
 # As modelled by the estimator: white noise, biases that walk.
 _AS_MODELLED = {
@@ -140,9 +147,7 @@ def _circle(random: libloc.Random) -> tuple[libloc.Motion, Floats]:
 
 def _look_at(random: libloc.Random) -> tuple[libloc.Motion, Floats]:
     low, high = np.array([3.5, -4.0, -0.5]), np.array([9.0, 4.0, 3.5])
-    points = [
-        [random.uniform(a, b) for a, b in zip(low, high, strict=True)] for _ in range(LOOK_AT_POINTS)
-    ]
+    points = [[random.uniform(a, b) for a, b in zip(low, high, strict=True)] for _ in range(LOOK_AT_POINTS)]
     return libloc.LookAtMotion(_TIMES, _PLACES, _TARGETS), np.array(points)
 
 
@@ -204,7 +209,7 @@ def _with_imu(world: World, seed: int) -> Simulated:
 
 
 def spoil(simulated: Simulated, how: str, seed: int) -> Simulated:
-    """Tracks as a bad tracker or a bad line gives them; nothing else changes. The first frames stay as they are.
+    """Tracks as a bad tracker or a bad line gives them; nothing else changes. The first 2 s stay as they are.
 
     outliers: 10 % of the observations are anywhere in the picture. dropped: 20 % of the frames are missing.
     dark: no feature for 2 s, in the middle. Raises ValueError for another word.
