@@ -187,8 +187,8 @@ def _errors_text(rows: list[CaseSummary]) -> list[str]:
         settled = "-" if one.settled_rms is None else f"{one.settled_rms.mean:.3f}"
         of_map = "-" if one.map_rms is None else f"{one.map_rms.mean:.3f}"
         lines.append(
-            f"{one.case.label:{width}}  {one.rms.runs:4d}  {figures:>36}  {settled:>7}  {one.turned_deg:11.2f}"
-            f"  {of_map:>6}  {one.nis_per_dim:7.3f}  {one.diverged:4d}"
+            f"{one.case.label:{width}}  {one.rms.runs:4d}  {figures:>36}  {settled:>7}  "
+            f"{one.turned_deg:11.2f}  {of_map:>6}  {one.nis_per_dim:7.3f}  {one.diverged:4d}"
         )
     return lines
 
@@ -328,7 +328,8 @@ def _write_rows(study: Study, path: Path) -> None:
         table = csv.writer(file)
         table.writerow(
             "row table group runs rms_mean_m rms_median_m rms_min_m rms_max_m settled_rms_m "
-            "orientation_rms_deg map_rms_m nis_per_dim nis_per_dim_expected nees_position nees_orientation diverged".split()
+            "orientation_rms_deg map_rms_m nis_per_dim nis_per_dim_expected nees_position nees_orientation "
+            "diverged".split()
         )
         for one in study.rows:
             nees = study.consistency.get(one.case.name)

@@ -249,7 +249,7 @@ def all_cases(quick: bool = False) -> list[Case]:
 
 
 def selected(names: list[str], quick: bool = False) -> list[Case]:
-    """Rows by their names or those of their tables; all for none. Raises StudyError naming what is unknown."""
+    """Rows by their names or those of their tables; all for none. Raises StudyError naming an unknown one."""
     cases = all_cases(quick)
     for name in names:
         if name not in TABLES and all(case.name != name for case in cases):

@@ -45,10 +45,12 @@ def _runs(study: Study, name: str) -> list[Outcome]:
 
 
 def _curves(axes: Axes, runs: list[Outcome], curve: str) -> tuple[Floats, Floats]:
+    """Without the first frame, whose error is zero."""
     for i, one in enumerate(runs):
-        axes.plot(one.times_s, getattr(one, curve), color=_RUN, lw=0.5, label="runs" if i == 0 else None)
+        label = "runs" if i == 0 else None
+        axes.plot(one.times_s[1:], getattr(one, curve)[1:], color=_RUN, lw=0.5, label=label)
     times, values = _over_runs(runs, curve)
-    axes.plot(times, values, color=_ESTIMATED, lw=1.5, label=f"RMS of {len(runs)} runs")
+    axes.plot(times[1:], values[1:], color=_ESTIMATED, lw=1.5, label=f"RMS of {len(runs)} runs")
     return times, values
 
 
@@ -212,7 +214,7 @@ def plot_robustness(study: Study, worlds: list[str], path: Path) -> None:
             if not runs:
                 continue
             times, values = _over_runs(runs, "error_m") if name != "dropped" else _of_dropped(runs)
-            axes.plot(times, values, color=colour, lw=1, label=SPOILT.get(name, "clean"))
+            axes.plot(times[1:], values[1:], color=colour, lw=1, label=SPOILT.get(name, "clean"))
             if name == "dark":
                 middle = float(times[-1]) / 2
                 axes.axvspan(middle - DARK_S / 2, middle + DARK_S / 2, color="0.9", lw=0)

@@ -2,8 +2,8 @@
 
 Errors are of body against the truth, in the filter's own world, without alignment: the start is given, and
 where no IMU gives the metre, known landmarks do. With an IMU the filter begins at a place and a heading by
-convention; the truth is moved there, by place and heading of the first estimate and nothing else. A row may ask
-for the best similarity transform instead (aligned), where the unit of lengths is not known.
+convention; the truth is moved there, by place and turn about z of the first estimate and nothing else. A row
+may ask for the best similarity transform instead (aligned), where the unit of lengths is not known.
 """
 
 from __future__ import annotations
@@ -117,10 +117,8 @@ def options_of(case: Case, simulated: Simulated) -> libloc.SlamOptions:
     return options
 
 
-def _heading(wxyz: Floats) -> float:
-    """About z, of a body's x axis."""
-    w, x, y, z = wxyz
-    return float(np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z)))
+def _attitude(wxyz: Floats) -> libloc.Pose3:
+    return libloc.Pose3(wxyz, np.zeros(3))
 
 
 def _moved_truth(
@@ -129,11 +127,13 @@ def _moved_truth(
     """Attitude, position and velocity that are true, in the filter's world."""
     q, p, v = simulated.q_wxyz[rows], simulated.position[rows], simulated.velocity[rows]
     if simulated.imu is not None:
-        half = 0.5 * (_heading(result.q_world_body_wxyz[0]) - _heading(q[0]))
-        turn = libloc.Pose3(np.array([np.cos(half), 0, 0, np.sin(half)]), np.zeros(3))
+        # The turn about z that leaves no error about z, which is what the filter's covariance begins with;
+        # headings of axes would bring in the tilt's error.
+        w, _, _, z = (_attitude(result.q_world_body_wxyz[0]) * _attitude(q[0]).inverse()).rotation_wxyz
+        turn = _attitude(np.array([w, 0, 0, z]) / np.hypot(w, z))
         R = turn.matrix()[:3, :3]
         offset = result.position[0] - R @ p[0]
-        turned = np.array([(turn * libloc.Pose3(one, np.zeros(3))).rotation_wxyz for one in q])
+        turned = np.array([(turn * _attitude(one)).rotation_wxyz for one in q])
         return turned, p @ R.T + offset, v @ R.T
     return q, p, v
 

@@ -44,7 +44,6 @@ _AS_MODELLED = {
     "imu.gyroscope.instability_sigma": 0,
     "imu.accelerometer.resolution": 0,
     "imu.gyroscope.resolution": 0,
-    "imu.sampling": "point",
     "streams.gps": False,
     "streams.magnetometer": False,
     "streams.odometry": False,
