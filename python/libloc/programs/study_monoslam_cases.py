@@ -23,7 +23,6 @@ from libloc.programs.study_runner import StudyError
 
 TABLES = ("document", "noise", "sweep", "consistency", "robustness")
 SETTLED_S = 5.0  # the initial peak is over
-DARK_S = 2.0  # without a feature
 CIRCLE_LANDMARKS = 15  # features of the first frame whose depth is known
 LOOK_AT_LANDMARKS = 6
 QUICK_S = 10.0

@@ -10,9 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from libloc.programs.study_monoslam_cases import CONSISTENCY, DARK_S, SETTLED_S, SPOILT, TABLES
+from libloc.programs.study_monoslam_cases import CONSISTENCY, SETTLED_S, SPOILT, TABLES
 from libloc.programs.study_monoslam_run import BLOCKS, Floats, Outcome
 from libloc.programs.study_monoslam_verdicts import NOISE_RATIO
+from libloc.programs.study_monoslam_worlds import DARK_S
 
 if TYPE_CHECKING:
     from libloc.programs.study_monoslam import CaseSummary, Study

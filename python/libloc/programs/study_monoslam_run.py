@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import libloc
-from libloc.programs.study_monoslam_cases import DARK_S, SETTLED_S, Case
-from libloc.programs.study_monoslam_worlds import Simulated, World, simulate
+from libloc.programs.study_monoslam_cases import SETTLED_S, Case
+from libloc.programs.study_monoslam_worlds import DARK_S, Simulated, World, simulate
 from libloc.programs.study_statistics import normalised_squares
 
 Floats = NDArray[np.float64]

@@ -11,7 +11,6 @@ Worlds:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +26,7 @@ CIRCLE_POINTS = 140
 LOOK_AT_S = 20.0
 LOOK_AT_POINTS = 80
 RATE_HZ = 30.0
+DARK_S = 2.0  # without a feature
 # Times [s], places and points looked at [m] of the look-at path: forward, a bend, and back.
 _TIMES = (0.0, 4.0, 8.0, 12.0, 16.0, 20.0)
 _PLACES = (
@@ -207,34 +207,33 @@ def _with_imu(world: World, seed: int) -> Simulated:
     )
 
 
-def spoil(simulated: Simulated, how: str, seed: int) -> Simulated:
-    """Tracks as a bad tracker or a bad line gives them; nothing else changes. The first 2 s stay as they are.
+def spoil(tracks: Tracks, camera: libloc.CameraCalibration, how: str, seed: int) -> Tracks:
+    """Tracks as a bad tracker or a bad line gives them. The first 2 s stay as they are.
 
     outliers: 10 % of the observations are anywhere in the picture. dropped: 20 % of the frames are missing.
-    dark: no feature for 2 s, in the middle. Raises ValueError for another word.
+    dark: no feature for 2 s, in the middle. "": as they are. Raises ValueError for another word.
     """
     if not how:
-        return simulated
+        return tracks
     rng = np.random.default_rng([seed, 7])
-    tracks = simulated.tracks
     times_s = (tracks.times_ns - tracks.times_ns[0]) * 1e-9
     late = times_s > 2.0
     if how == "outliers":
         wrong = (rng.random(len(tracks.id)) < 0.1) & np.repeat(late, np.diff(tracks.first))
-        size = np.array([simulated.camera.width_px - 1.0, simulated.camera.height_px - 1.0])
+        size = np.array([camera.width_px - 1.0, camera.height_px - 1.0])
         pixels = np.where(wrong[:, None], rng.random(tracks.pixel_px.shape) * size, tracks.pixel_px)
-        simulated.tracks = Tracks(tracks.times_ns, tracks.first, tracks.id, pixels)
-    elif how == "dropped":
-        simulated.tracks = tracks.of_frames(~late | (rng.random(len(late)) >= 0.2))
-    elif how == "dark":
+        return Tracks(tracks.times_ns, tracks.first, tracks.id, pixels)
+    if how == "dropped":
+        return tracks.of_frames(~late | (rng.random(len(late)) >= 0.2))
+    if how == "dark":
         middle = times_s[-1] / 2
-        simulated.tracks = tracks.emptied((times_s >= middle - 1) & (times_s < middle + 1))
-    else:
-        raise ValueError(f"spoilt {how!r}: must be outliers, dropped or dark")
-    return simulated
+        return tracks.emptied((times_s >= middle - DARK_S / 2) & (times_s < middle + DARK_S / 2))
+    raise ValueError(f"spoilt {how!r}: must be outliers, dropped or dark")
 
 
 def simulate(world: World, seed: int) -> Simulated:
     """The same world and seed give the same numbers."""
-    make: Any = _camera_alone if world.name in ("look-at", "circle") else _with_imu
-    return spoil(make(world, seed), world.spoilt, seed)
+    make = _camera_alone if world.name in ("look-at", "circle") else _with_imu
+    simulated = make(world, seed)
+    simulated.tracks = spoil(simulated.tracks, simulated.camera, world.spoilt, seed)
+    return simulated
