@@ -7,6 +7,7 @@
 
 #include "libloc/core/check.hpp"
 #include "libloc/core/statistics.hpp"
+#include "libloc/geometry/absolute_pose.hpp"
 #include "libloc/geometry/so3.hpp"
 
 namespace loc {
@@ -14,6 +15,17 @@ namespace {
 
 constexpr int kFewest = 3;              // features in a frame that hold a pose
 constexpr double kNonlinearSigmas = 1;  // so far from where the Jacobians say: another iteration
+
+constexpr std::size_t kFewestForPose = 6;
+constexpr double kWidePx = 150;          // a prediction that is no better than this says where to look, and no more
+constexpr double kKnownDepthPart = 0.3;  // relative deviation of a depth that gives a place
+constexpr double kFarthest = 27.9;       // chi-square of 6, 0.9999
+constexpr double kAbsurdPx = 1e4;        // a residual without meaning: the point is in the plane of the camera
+constexpr double kNarrowSigmas = 3;      // of a pixel's own deviation
+
+double square(double x) {
+  return x * x;
+}
 
 double root_mean_square(double sum, int count) {
   return count > 0 ? std::sqrt(sum / count) : kUnknown;
@@ -51,7 +63,9 @@ SlamFilter::SlamFilter(const SlamOptions& options)
   points_before_.resize(features);
   ranges_.reserve(features);
   marked_.reserve(features);
+  agrees_.reserve(features);
   depths_.reserve(features);
+  sighted_.reserve(features);
   cells_.resize(static_cast<std::size_t>(options.map.grid_columns * options.map.grid_rows));
   frame_.features.reserve(2 * features);
 }
@@ -178,7 +192,7 @@ void SlamFilter::match(const FeaturesMeasurement& frame) {
 
 bool SlamFilter::linearise(SlamLandmark& landmark, const Eigen::Vector2d& pixel_px, BlockMeasurement& out) const {
   const auto predicted = predict(state_, camera_, landmark.point);
-  if (!predicted) return false;
+  if (!predicted || !((pixel_px - *predicted).norm() < kAbsurdPx)) return false;
   const bool first = options_.consistency == SlamConsistency::kFirstEstimate;
   SlamState at = state_;
   SlamPoint point = landmark.point;
@@ -205,10 +219,57 @@ bool SlamFilter::linearise(SlamLandmark& landmark, const Eigen::Vector2d& pixel_
   return true;
 }
 
+// After a while without features the prior is so wide that Jacobians at it mean nothing. The pose that explains most
+// pixels with the map as it is tells where to take them; the prior itself stays what it was: r = z - h(x_1) +
+// H_1 (x_1 - x_0). dx_ is x_1 - x_0 then.
+bool SlamFilter::approach(const FeaturesMeasurement& frame, SlamState& near) {
+  Matrix6d prior_cov;
+  covariance_.read(0, 0, prior_cov);
+  const double focal_px = options_.camera.intrinsics_px.head<2>().minCoeff();
+  const double usual = usual_inverse_depth();
+  const double wide_px = focal_px * std::sqrt(prior_cov.topLeftCorner<3, 3>().trace() +
+                                              square(std::isfinite(usual) ? usual : options_.map.inverse_depth) *
+                                                  prior_cov.bottomRightCorner<3, 3>().trace());
+  if (!(wide_px > kWidePx)) return false;
+  // Directions to those points whose place is known.
+  sighted_.clear();
+  for (const SlamLandmark& landmark : landmarks_) {
+    if (landmark.observation < 0) continue;
+    const auto ray = camera_.unproject(frame.features[static_cast<std::size_t>(landmark.observation)].pixel_px);
+    if (!ray) continue;
+    if (landmark.point.converted) {
+      sighted_.push_back({landmark.point.position, *ray});
+      continue;
+    }
+    const int at = landmark.offset + kInverseDepth;
+    const double rho = landmark.point.inverse_depth.inverse_depth;
+    if (std::sqrt(std::max(0.0, covariance_(at, at))) < kKnownDepthPart * rho) {
+      sighted_.push_back({landmark.point.inverse_depth.xyz(), *ray});
+    }
+  }
+  if (sighted_.size() < kFewestForPose) return false;
+  AbsolutePoseOptions narrowing;
+  narrowing.last_width = kNarrowSigmas * sigma_px(frame) / focal_px;
+  const auto found = absolute_pose(sighted_, state_.T_world_camera(), narrowing);
+  if (!found) return false;
+  const Pose3 body = *found * state_.T_body_camera.inverse();
+  dx_.setZero();
+  dx_.segment<3>(kTheta) = so3::boxminus(body.rotation, state_.q_world_body);
+  dx_.segment<3>(kPosition) = body.translation - state_.position;
+  // What the prior excludes, it is not.
+  prior_cov.diagonal().array() += 1e-12;
+  if (!(dx_.head<6>().dot(prior_cov.ldlt().solve(dx_.head<6>())) < kFarthest)) return false;
+  near = state_;
+  boxplus(near, layout_, dx_);
+  return true;
+}
+
 void SlamFilter::select_measured(const FeaturesMeasurement& frame) {
   const double sigma = sigma_px(frame);
   candidates_.clear();
   which_.clear();
+  const SlamState prior = state_;
+  approached_ = approach(frame, state_);
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     SlamLandmark& landmark = landmarks_[i];
     if (landmark.observation < 0) continue;
@@ -219,9 +280,11 @@ void SlamFilter::select_measured(const FeaturesMeasurement& frame) {
       landmark.state = SlamFeatureState::kRejected;
       continue;
     }
+    if (approached_) measurement.residual.head<2>() += moved_by(measurement);
     landmark.innovation_cov = covariance_.innovation_cov(measurement).topLeftCorner<2, 2>();
     candidates_.push_back(static_cast<int>(i));
   }
+  state_ = prior;
   const auto most = static_cast<std::size_t>(options_.map.max_measured);
   if (candidates_.size() > most) {
     const auto tells = [&](int i) { return landmarks_[static_cast<std::size_t>(i)].innovation_cov.determinant(); };
@@ -272,6 +335,22 @@ void SlamFilter::apply_update() {
   covariance_.shear(kTheta, shear_);
 }
 
+const std::vector<char>& SlamFilter::agreeing(double sigma) {
+  if (!approached_) {
+    return options_.association.ransac
+               ? ransac_.run(covariance_, residual_, sigma, static_cast<std::uint64_t>(time_ns_))
+               : ransac_.compatible(covariance_, residual_);
+  }
+  // One measurement says nothing where the prior says nothing: those agree that fit the pose that was found.
+  agrees_.assign(which_.size(), 0);
+  for (std::size_t k = 0; k < which_.size(); ++k) {
+    const BlockMeasurement& m = measurements_[static_cast<std::size_t>(which_[k])];
+    const Eigen::Vector2d left = m.residual.head<2>() - moved_by(m);
+    agrees_[k] = left.norm() < 2 * kNarrowSigmas * sigma ? 1 : 0;
+  }
+  return agrees_;
+}
+
 void SlamFilter::update_agreeing(const FeaturesMeasurement& frame) {
   if (which_.empty()) return;
   covariance_.innovate(measurements_, which_);
@@ -281,9 +360,7 @@ void SlamFilter::update_agreeing(const FeaturesMeasurement& frame) {
     residual_.push_back(measurement.residual[0]);
     residual_.push_back(measurement.residual[1]);
   }
-  const std::vector<char>& agrees = options_.association.ransac ? ransac_.run(covariance_, residual_, sigma_px(frame),
-                                                                              static_cast<std::uint64_t>(time_ns_))
-                                                                : ransac_.compatible(covariance_, residual_);
+  const std::vector<char>& agrees = agreeing(sigma_px(frame));
   accepted_.clear();
   accepted_residual_.clear();
   for (std::size_t k = 0; k < which_.size(); ++k) {
@@ -315,7 +392,7 @@ void SlamFilter::update_agreeing(const FeaturesMeasurement& frame) {
 void SlamFilter::iterate(const FeaturesMeasurement& frame) {
   const SlamState prior = state_;
   for (int i = 1; i < options_.max_iterations; ++i) {
-    if (!covariance_.correction(accepted_, accepted_residual_, dx_)) return;
+    if (!covariance_.correction(accepted_, accepted_residual_, dx_) || !dx_.allFinite()) return;
     for (std::size_t k = 0; k < landmarks_.size(); ++k) {
       SlamLandmark& landmark = landmarks_[k];
       if (i == 1) points_before_[k] = landmark.point;

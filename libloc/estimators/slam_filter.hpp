@@ -31,6 +31,7 @@
 #include "libloc/estimators/slam_ransac.hpp"
 #include "libloc/estimators/slam_state.hpp"
 #include "libloc/filter/map_covariance.hpp"
+#include "libloc/geometry/absolute_pose.hpp"
 
 namespace loc {
 
@@ -119,6 +120,8 @@ class SlamFilter {
   void match(const FeaturesMeasurement& frame);
   void select_measured(const FeaturesMeasurement& frame);
   bool linearise(SlamLandmark& landmark, const Eigen::Vector2d& pixel_px, BlockMeasurement& out) const;
+  bool approach(const FeaturesMeasurement& frame, SlamState& near);
+  const std::vector<char>& agreeing(double sigma);
   void update_agreeing(const FeaturesMeasurement& frame);
   void iterate(const FeaturesMeasurement& frame);
   Eigen::Vector2d moved_by(const BlockMeasurement& measurement) const;
@@ -163,8 +166,11 @@ class SlamFilter {
   std::vector<SlamPoint> points_before_;
   std::vector<CovarianceRange> ranges_;
   std::vector<char> marked_;
+  std::vector<char> agrees_;
+  bool approached_ = false;  // the Jacobians of this frame are at another pose than the prior's
   std::vector<int> cells_;
   mutable std::vector<double> depths_;
+  std::vector<SightedPoint> sighted_;
   Eigen::VectorXd dx_;
   Eigen::MatrixX3d shear_;
   double nis_ = 0;

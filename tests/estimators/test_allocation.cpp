@@ -8,11 +8,13 @@
 
 #include "libloc/estimators/error_state_filter.hpp"
 #include "libloc/estimators/fusion_preset.hpp"
+#include "libloc/estimators/inertial_slam.hpp"
 #include "libloc/estimators/madgwick.hpp"
 #include "libloc/sensors/clock_gps.hpp"
 #include "libloc/sensors/stream.hpp"
 #include "libloc/sim/clock.hpp"
 #include "support/simulated_imu.hpp"
+#include "support/slam_ride.hpp"
 
 namespace {
 std::atomic<long> allocations{0};
@@ -115,6 +117,38 @@ TEST(Allocation, TheStreamMergerKeepsItsMemory) {
   }
   EXPECT_EQ(allocations, warm);
   EXPECT_GT(out, 2000);
+}
+
+// Features come and go, are converted, rejected, rescued: none of it allocates.
+TEST(Allocation, SlamDoesNotAllocatePerFrame) {
+  test::SlamRideOptions ride;
+  ride.outlier_rate = 0.1;
+  for (const SlamConsistency consistency : {SlamConsistency::kFirstEstimate, SlamConsistency::kInvariant}) {
+    SlamOptions options = test::ride_options(SlamMotion::kInertial);
+    options.consistency = consistency;
+    options.map.max_features = 40;
+    InertialSlam slam(options);
+    std::vector<Measurement> recording;
+    test::SlamRide(ride).run(14, [&](const Measurement& m) { recording.push_back(m); });
+    long before = 0;
+    std::int64_t added = 0;
+    for (const Measurement& m : recording) {
+      const auto* frame = std::get_if<FeaturesMeasurement>(&m);
+      const bool warm = test::SlamRide::time_s(stamp_of(m).time_ns) > 9;
+      if (frame != nullptr) {
+        slam.process(m);  // the frame is copied into the queue, and moved out of it: its own memory
+        continue;
+      }
+      before = allocations;
+      slam.process(m);
+      const Estimate estimate = slam.estimate();
+      if (!warm) continue;
+      ASSERT_TRUE(estimate.position.allFinite());
+      for (const SlamFrame& done : slam.frames()) added += done.counts.added;
+      ASSERT_EQ(allocations, before) << test::SlamRide::time_s(stamp_of(m).time_ns);
+    }
+    EXPECT_GT(added, 20);
+  }
 }
 
 }  // namespace
