@@ -41,6 +41,19 @@ class Fifo {
     for (std::size_t i = size_ - 1; i > index; --i) std::swap((*this)[i], (*this)[i - 1]);
   }
 
+  /// A slot at the end, as it was left by whoever had it: to be filled by assignment, which keeps its memory.
+  T& push_slot() {
+    if (size_ == slots_.size()) grow();
+    ++size_;
+    return (*this)[size_ - 1];
+  }
+  /// Gives the first slot up as it is; it keeps its memory for who comes next.
+  void drop_front() {
+    assert(size_ > 0);
+    first_ = (first_ + 1) & (slots_.size() - 1);
+    --size_;
+  }
+
   /// Takes the first element out. It must not be empty.
   T pop_front() {
     T value = std::move((*this)[0]);

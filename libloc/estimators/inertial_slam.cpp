@@ -14,6 +14,11 @@ constexpr std::size_t kMostWaiting = 256;   // frames without an IMU sample afte
 constexpr TimeNs kRestEvery = 100'000'000;  // between two uses of rest [ns]
 constexpr int kTryEvery = 5;                // frames from one try of a start in motion to the next
 constexpr double kVibrationTime = 0.1;      // over which shaking is averaged [s]
+constexpr double kLongestHold = 0.5;        // of samples for frames [s]
+constexpr double kFarthestAhead = 10;       // of the IMU: a frame is on another clock [s]
+constexpr double kStillAtStart = 2;         // times as much may a body sway before the start
+constexpr double kPictureIsOld = 0.5;       // says nothing of now [s]
+constexpr double kFarthestWay = 100;        // deviation of a place after a gap [m]
 constexpr double kAnyHeading = 1.8;         // deviation of any angle in a turn [rad]
 constexpr double kRecoverAngle = 0.02;      // what is unknown after a contradiction [rad]
 constexpr double kRecoverPosition = 0.1;    // [m]
@@ -32,6 +37,16 @@ ImuMeasurement between(const ImuMeasurement& a, const ImuMeasurement& b, TimeNs 
   out.angular_velocity = (1 - part) * a.angular_velocity + part * b.angular_velocity;
   out.specific_force = (1 - part) * a.specific_force + part * b.specific_force;
   return out;
+}
+
+// The world turns under the body by that angle about its vertical.
+void turn_about_up(double angle, SlamState& state, Eigen::MatrixXd& covariance) {
+  const Eigen::Quaterniond about_up(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()));
+  state.q_world_body = (about_up * state.q_world_body).normalized();
+  state.velocity = about_up * state.velocity;
+  const Eigen::Matrix3d turned = about_up.toRotationMatrix();
+  covariance.middleRows<3>(kVelocity) = (turned * covariance.middleRows<3>(kVelocity)).eval();
+  covariance.middleCols<3>(kVelocity) = (covariance.middleCols<3>(kVelocity) * turned.transpose()).eval();
 }
 
 SlamStartOptions moving_start_options(const SlamOptions& options) {
@@ -61,12 +76,18 @@ void InertialSlam::reset() {
   start_.reset();
   moving_start_.reset();
   rest_.reset();
-  while (!waiting_.empty()) waiting_.pop_front();
+  while (!waiting_.empty()) waiting_.drop_front();
+  while (!held_.empty()) held_.drop_front();
+  leap_.reset();
+  newest_ns_ = kNoTime;
+  frames_set_back_ = 0;
+  vibration_ = Vibration{};
+  status_ = next_status_ = 0;
   early_.clear();
   frame_count_ = 0;
   carried_.reset();
-  picture_.clear();
-  still_frames_ = early_frames_ = rejected_in_a_row_ = 0;
+  early_frames_ = rejected_in_a_row_ = 0;
+  forget_picture();
   last_ = Stamp{};
   last_good_frame_ns_ = last_frame_ns_ = rest_used_ns_ = kNoTime;
   restored_ = false;
@@ -81,11 +102,44 @@ void InertialSlam::restore(const SlamSnapshot& snapshot) {
 
 bool InertialSlam::process(const Measurement& measurement) {
   frame_count_ = 0;
-  if (const auto* imu = std::get_if<ImuMeasurement>(&measurement)) return process_imu(*imu);
+  if (const auto* imu = std::get_if<ImuMeasurement>(&measurement)) return receive(*imu);
   if (const auto* frame = std::get_if<FeaturesMeasurement>(&measurement)) {
     if (frame->camera == options().camera_index) process_frame(*frame);
   }
   return false;
+}
+
+// Streams come in the order of their stamps. A camera whose clock is ahead (negative time offset) has its frames come
+// when the IMU is past them: samples are held back for so long.
+TimeNs InertialSlam::hold_back_ns() const {
+  const SlamLayout& layout = filter_.layout();
+  double offset = options().camera.time_offset_s;
+  double sigma = layout.time_offset >= 0 ? options().sigma_time_offset : 0;
+  if (filter_.started() && layout.time_offset >= 0) {
+    offset = filter_.state().time_offset_s;
+    sigma = std::sqrt(std::max(0.0, filter_.covariance()(layout.time_offset, layout.time_offset)));
+  }
+  return from_seconds(std::clamp(-offset + 3 * sigma, 0.0, kLongestHold));
+}
+
+bool InertialSlam::receive(const ImuMeasurement& imu) {
+  if (!usable(imu)) return false;
+  // One sample far ahead is an error of the stamp, two are a pause.
+  if (newest_ns_ != kNoTime && to_seconds(imu.time_ns - newest_ns_) > options().max_imu_bridge_s) {
+    const double apart = leap_ ? to_seconds(imu.time_ns - leap_->time_ns) : -1;
+    const bool again = apart > 0 && apart <= options().max_imu_bridge_s;
+    if (leap_) skip("imu.skipped.alone_after_gap", kOutOfRange);
+    leap_ = imu;
+    if (!again) return false;
+  }
+  leap_.reset();
+  newest_ns_ = imu.time_ns;
+  const TimeNs hold = hold_back_ns();
+  if (hold == 0 && held_.empty()) return process_imu(imu);
+  held_.push_back(imu);
+  bool any = false;
+  while (!held_.empty() && held_.front().time_ns + hold <= imu.time_ns) any = process_imu(held_.pop_front()) || any;
+  return any;
 }
 
 TimeNs InertialSlam::on_imu_clock(TimeNs camera_time_ns) const {
@@ -94,16 +148,22 @@ TimeNs InertialSlam::on_imu_clock(TimeNs camera_time_ns) const {
 }
 
 void InertialSlam::process_frame(const FeaturesMeasurement& frame) {
-  if (last_frame_ns_ != kNoTime && frame.time_ns <= last_frame_ns_) {
-    skip("features.skipped.time_not_increasing", kTimeNotIncreasing);
+  if (newest_ns_ != kNoTime && to_seconds(frame.time_ns - newest_ns_) > kFarthestAhead) {
+    skip("features.skipped.out_of_range", kOutOfRange);
     return;
   }
+  if (last_frame_ns_ != kNoTime && frame.time_ns <= last_frame_ns_) {
+    skip("features.skipped.time_not_increasing", kTimeNotIncreasing);
+    if (++frames_set_back_ < kSetBackAfter) return;
+    while (!waiting_.empty()) waiting_.drop_front();
+  }
+  frames_set_back_ = 0;
   if (waiting_.size() == kMostWaiting) {
-    waiting_.pop_front();
+    waiting_.drop_front();
     skip("features.skipped.without_imu", 0);
   }
   last_frame_ns_ = frame.time_ns;
-  waiting_.push_back(frame);
+  waiting_.push_slot() = frame;
   if (filter_.started()) return;
   ++early_frames_;
   moving_start_.push(frame);
@@ -119,7 +179,7 @@ bool InertialSlam::usable(const ImuMeasurement& imu) {
     skip("imu.skipped.out_of_range", kOutOfRange);
     return false;
   }
-  if (imu.time_ns > last_.time_ns) {  // kNoTime is before every time
+  if (imu.time_ns > newest_ns_) {  // kNoTime is before every time
     set_back_in_a_row_ = 0;
     return true;
   }
@@ -133,7 +193,6 @@ bool InertialSlam::usable(const ImuMeasurement& imu) {
 }
 
 bool InertialSlam::process_imu(const ImuMeasurement& imu) {
-  if (!usable(imu)) return false;
   last_ = imu;
   status_ = next_status_;
   next_status_ = 0;
@@ -148,6 +207,7 @@ bool InertialSlam::process_imu(const ImuMeasurement& imu) {
     variance.segment<3>(kPosition).setConstant(square(options().gap_acceleration_sigma * gap * gap));
     filter_.widen(variance);
     status_ |= kGap;
+    last_good_frame_ns_ = imu.time_ns;
     restored_ = false;
     return true;
   }
@@ -189,7 +249,7 @@ bool InertialSlam::look_for_start() {
     std::erase_if(early_, [&](const ImuMeasurement& imu) { return imu.time_ns < oldest; });
   }
   while (!waiting_.empty() && on_imu_clock(waiting_.front().time_ns) < oldest) {
-    waiting_.pop_front();
+    waiting_.drop_front();
     skip("features.skipped.before_start", 0);
   }
   return false;
@@ -247,14 +307,20 @@ void InertialSlam::begin(TimeNs time_ns, const InertialState& from,
     covariance.diagonal().segment<3>(layout.extrinsic_position).setConstant(square(o.sigma_extrinsic_position));
   }
   if (layout.time_offset >= 0) covariance(layout.time_offset, layout.time_offset) = square(o.sigma_time_offset);
-  if (carried_) carry_over(time_ns, state, covariance);
+  if (carried_) {
+    carry_over(time_ns, state, covariance);
+  } else if (o.q_world_body) {
+    turn_about_up(so3::heading(*o.q_world_body) - so3::heading(state.q_world_body), state, covariance);
+    const Eigen::Vector3d up = state.q_world_body.conjugate() * Eigen::Vector3d::UnitZ();
+    covariance.block<3, 3>(kTheta, kTheta) += square(o.sigma_orientation) * up * up.transpose();
+  }
   ++counts_[count];
   filter_.start(time_ns, state, covariance);
   last_good_frame_ns_ = time_ns;
   carried_.reset();
   // Frames from before the start have no place in it.
   while (!waiting_.empty() && on_imu_clock(waiting_.front().time_ns) < time_ns) {
-    waiting_.pop_front();
+    waiting_.drop_front();
     skip("features.skipped.before_start", 0);
   }
 }
@@ -263,14 +329,8 @@ void InertialSlam::begin(TimeNs time_ns, const InertialState& from,
 void InertialSlam::carry_over(TimeNs time_ns, SlamState& state, Eigen::MatrixXd& covariance) const {
   const SlamState& was = carried_->state;
   const double gap = std::max(0.0, to_seconds(time_ns - carried_->time_ns));
-  const double turn = so3::heading(was.q_world_body) - so3::heading(state.q_world_body);
-  const Eigen::Quaterniond about_up(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()));
-  state.q_world_body = (about_up * state.q_world_body).normalized();
-  state.velocity = about_up * state.velocity;
+  turn_about_up(so3::heading(was.q_world_body) - so3::heading(state.q_world_body), state, covariance);
   state.position = was.position;
-  const Eigen::Matrix3d turned = about_up.toRotationMatrix();
-  covariance.middleRows<3>(kVelocity) = (turned * covariance.middleRows<3>(kVelocity)).eval();
-  covariance.middleCols<3>(kVelocity) = (covariance.middleCols<3>(kVelocity) * turned.transpose()).eval();
 
   const Eigen::Vector3d up_then = was.q_world_body.conjugate() * Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d up = state.q_world_body.conjugate() * Eigen::Vector3d::UnitZ();
@@ -278,7 +338,9 @@ void InertialSlam::carry_over(TimeNs time_ns, SlamState& state, Eigen::MatrixXd&
                          square(std::min(options().gap_angular_velocity_sigma * gap, kAnyHeading));
   covariance.block<3, 3>(kTheta, kTheta) += heading * up * up.transpose();
   covariance.block<3, 3>(kPosition, kPosition) = carried_->covariance.block<3, 3>(kPosition, kPosition);
-  const double way = was.velocity.norm() * gap + 0.5 * options().gap_acceleration_sigma * gap * gap;
+  // A bound, or the numbers would be such that nobody can calculate with them; the place is one of many by then.
+  const double way =
+      std::min(kFarthestWay, was.velocity.norm() * gap + 0.5 * options().gap_acceleration_sigma * gap * gap);
   covariance.diagonal().segment<3>(kPosition).array() += square(way);
 }
 
@@ -349,7 +411,7 @@ void InertialSlam::start_anew() {
   moving_start_.reset();
   rest_.reset();
   early_.clear();
-  still_frames_ = 0;
+  forget_picture();
 }
 
 void InertialSlam::run(const ImuMeasurement& imu) {
@@ -365,25 +427,41 @@ void InertialSlam::run(const ImuMeasurement& imu) {
   while (!waiting_.empty()) {
     const TimeNs time_ns = on_imu_clock(waiting_.front().time_ns);
     if (time_ns > imu.time_ns) break;
-    const FeaturesMeasurement frame = waiting_.pop_front();
+    std::swap(taking_, waiting_[0]);
+    waiting_.drop_front();
     if (time_ns < filter_.time_ns()) {
       skip("features.skipped.late", kTooLate);
       continue;
     }
     step_to(time_ns, imu);
-    take_frame(frame);
+    take_frame(taking_);
   }
   step_to(imu.time_ns, imu);
   last_imu_ = imu;
   ++imu_used_;
   look_for_rest(imu);
+  if (!filter_.healthy()) {
+    ++counts_["diverged"];
+    next_status_ |= kReinitialised;
+    filter_.stop();
+    start_.reset();
+    moving_start_.reset();
+    early_.clear();
+    forget_picture();
+    return;
+  }
   if (to_seconds(imu.time_ns - last_good_frame_ns_) > options().lost_after_s) status_ |= kFewFeatures;
 }
 
-// How far the picture moved since the frame before: the largest of the medians along u and v, away from its centre and
+void InertialSlam::forget_picture() {
+  picture_before_.clear();
+  picture_before_ns_ = picture_ns_ = kNoTime;
+  at_rest_ = false;
+}
+
+// How far the picture moved since picture_before_: the largest of the medians along u and v, away from its centre and
 // around it, so that the noise of single features does not count. NaN when too few are in both.
 double InertialSlam::moved_px(const FeaturesMeasurement& frame) {
-  picture_.swap(picture_before_);
   picture_.assign(frame.features.begin(), frame.features.end());
   std::sort(picture_.begin(), picture_.end(),
             [](const FeatureObservation& a, const FeatureObservation& b) { return a.id < b.id; });
@@ -393,7 +471,7 @@ double InertialSlam::moved_px(const FeaturesMeasurement& frame) {
   for (const FeatureObservation& feature : picture_) {
     while (other != picture_before_.end() && other->id < feature.id) ++other;
     if (other == picture_before_.end()) break;
-    if (other->id != feature.id) continue;
+    if (other->id != feature.id || !feature.pixel_px.allFinite() || !other->pixel_px.allFinite()) continue;
     const Eigen::Vector2d move = feature.pixel_px - other->pixel_px;
     const Eigen::Vector2d out = (other->pixel_px - centre).normalized();
     moves_[0].push_back(move.x());
@@ -411,26 +489,38 @@ double InertialSlam::moved_px(const FeaturesMeasurement& frame) {
   return most;
 }
 
-// Of the frames since then.
+// The picture stands still as long as it is where it was a second ago and longer: what creeps moves from frame to frame
+// by less than can be seen, but not from second to second.
+void InertialSlam::see_picture(const FeaturesMeasurement& frame) {
+  picture_ns_ = filter_.time_ns();
+  if (moved_px(frame) < options().still_picture_px) return;
+  picture_before_.swap(picture_);
+  picture_before_ns_ = picture_ns_;
+}
+
+bool InertialSlam::picture_stands_still() const {
+  return picture_before_ns_ != kNoTime && to_seconds(picture_ns_ - picture_before_ns_) >= options().still_picture_s &&
+         to_seconds(last_.time_ns - picture_ns_) < kPictureIsOld;
+}
+
+// Of the frames since then: against the first of them, so that what creeps shows.
 bool InertialSlam::waiting_frames_stand_still(TimeNs since_ns) {
   std::size_t first = 0;
   while (first < waiting_.size() && on_imu_clock(waiting_[first].time_ns) < since_ns) ++first;
   if (waiting_.size() < first + 3) return false;
   moved_px(waiting_[first]);
+  picture_before_.swap(picture_);
   for (std::size_t i = first + 1; i < waiting_.size(); ++i) {
-    if (!(moved_px(waiting_[i]) < options().still_picture_px)) return false;
+    if (!(moved_px(waiting_[i]) < kStillAtStart * options().still_picture_px)) return false;
   }
-  // What creeps from frame to frame shows over all of them.
-  moved_px(waiting_[first]);
-  return moved_px(waiting_.back()) < 2 * options().still_picture_px;
+  return true;
 }
 
 void InertialSlam::take_frame(const FeaturesMeasurement& frame) {
-  still_frames_ = moved_px(frame) < options().still_picture_px ? still_frames_ + 1 : 0;
-
-  const SlamFrame& done = filter_.update(frame, status_);
+  see_picture(frame);
+  const SlamFrame& done = filter_.update(frame, status_ | (at_rest_ ? kAtRest : 0U));
   ++frames_used_;
-  if ((done.estimate.status & kFewFeatures) == 0 && done.counts.in_frame > 0) last_good_frame_ns_ = filter_.time_ns();
+  if ((done.estimate.status & kFewFeatures) == 0) last_good_frame_ns_ = filter_.time_ns();
   recover(done);
   if (frame_count_ == frames_.size()) frames_.emplace_back();
   SlamFrame& out = frames_[frame_count_++];
@@ -455,14 +545,20 @@ void InertialSlam::recover(const SlamFrame& frame) {
 void InertialSlam::look_for_rest(const ImuMeasurement& imu) {
   const double bias_sigma = std::sqrt(std::max(0.0, filter_.covariance()(kGyroscopeBias, kGyroscopeBias)));
   const bool still = rest_.update(imu, filter_.state().gyroscope_bias, bias_sigma) && picture_stands_still();
-  if (!still) return;
-  status_ |= kAtRest;
-  if (!options().zero_velocity) return;
-  if (rest_used_ns_ != kNoTime && imu.time_ns - rest_used_ns_ < kRestEvery) return;
-  rest_used_ns_ = imu.time_ns;
-  const double sigma_rate = std::hypot(rest_.mean_rate_sigma(), options().zero_rate_sigma_floor);
-  const bool taken = filter_.zero_velocity(options().zero_velocity_sigma, rest_.mean_rate(), sigma_rate);
-  ++counts_[taken ? "rest.used" : "rest.rejected"];
+  if (!still) {
+    at_rest_ = false;
+    return;
+  }
+  if (!options().zero_velocity) {
+    at_rest_ = true;
+  } else if (rest_used_ns_ == kNoTime || imu.time_ns - rest_used_ns_ >= kRestEvery) {
+    rest_used_ns_ = imu.time_ns;
+    const double sigma_rate = std::hypot(rest_.mean_rate_sigma(), options().zero_rate_sigma_floor);
+    at_rest_ = filter_.zero_velocity(options().zero_velocity_sigma, rest_.mean_rate(), sigma_rate);
+    ++counts_[at_rest_ ? "rest.used" : "rest.rejected"];
+    if (!at_rest_) forget_picture();  // The filter knows that it moves; let the picture prove the contrary.
+  }
+  if (at_rest_) status_ |= kAtRest;
 }
 
 Estimate InertialSlam::estimate() const {

@@ -67,7 +67,9 @@ class InertialSlam {
     Eigen::MatrixXd covariance;
   };
 
+  bool receive(const ImuMeasurement& imu);
   bool process_imu(const ImuMeasurement& imu);
+  TimeNs hold_back_ns() const;
   void process_frame(const FeaturesMeasurement& frame);
   bool usable(const ImuMeasurement& imu);
   bool look_for_start();
@@ -84,10 +86,12 @@ class InertialSlam {
   InertialStepNoise noise_of(double dt_s) const;
   void see_vibration(const ImuMeasurement& imu);
   void take_frame(const FeaturesMeasurement& frame);
+  void forget_picture();
+  void see_picture(const FeaturesMeasurement& frame);
   double moved_px(const FeaturesMeasurement& frame);
   bool waiting_frames_stand_still(TimeNs since_ns);
   void look_for_rest(const ImuMeasurement& imu);
-  bool picture_stands_still() const { return still_frames_ >= 2; }
+  bool picture_stands_still() const;
   TimeNs on_imu_clock(TimeNs camera_time_ns) const;
   void skip(const char* count, std::uint32_t status);
 
@@ -98,17 +102,24 @@ class InertialSlam {
   std::vector<SlamFrame> frames_;
   std::size_t frame_count_ = 0;
 
-  Fifo<FeaturesMeasurement> waiting_;  // frames, for the IMU
-  std::vector<ImuMeasurement> early_;  // samples, for the start
-  int early_frames_ = 0;               // since a start was last tried
-  ImuMeasurement last_imu_;            // as the filter's state is; its rate and force at the filter's time
-  Stamp last_;
+  Fifo<ImuMeasurement> held_;           // samples that wait for frames whose clock is ahead
+  std::optional<ImuMeasurement> leap_;  // a sample far ahead of all others: the next one tells what it was
+  FeaturesMeasurement taking_;          // the frame at hand
+  Fifo<FeaturesMeasurement> waiting_;   // frames, for the IMU
+  std::vector<ImuMeasurement> early_;   // samples, for the start
+  int early_frames_ = 0;                // since a start was last tried
+  ImuMeasurement last_imu_;             // as the filter's state is; its rate and force at the filter's time
+  Stamp last_;                          // of the sample that the estimate is for
+  TimeNs newest_ns_ = kNoTime;          // sample received
+  int frames_set_back_ = 0;             // in a row
   std::optional<Carried> carried_;
   Vibration vibration_;
   std::vector<FeatureObservation> picture_;  // of the last frame, by identity: does it stand still?
   std::vector<FeatureObservation> picture_before_;
   std::array<std::vector<double>, 4> moves_;
-  int still_frames_ = 0;
+  TimeNs picture_before_ns_ = kNoTime;  // of picture_before_, from which the picture has not moved since
+  TimeNs picture_ns_ = kNoTime;         // of the last frame that was taken
+  bool at_rest_ = false;
   int rejected_in_a_row_ = 0;
   TimeNs last_good_frame_ns_ = kNoTime;
   TimeNs last_frame_ns_ = kNoTime;

@@ -9,6 +9,8 @@ namespace {
 
 // Frames in a row on an earlier time line that mean: the clock was set back.
 constexpr int kSetBackAfter = 10;
+// What is unknown after longer is no less known: the numbers must stay such that one can calculate with them. [s]
+constexpr double kLongestPause = 30;
 
 }  // namespace
 
@@ -19,6 +21,8 @@ MonoSlam::MonoSlam(const SlamOptions& options) : filter_(options) {
 void MonoSlam::reset() {
   filter_.stop();
   estimate_.valid = 0;
+  estimate_.status = kInitialising;
+  next_status_ = 0;
   restored_ = false;
   set_back_in_a_row_ = 0;
 }
@@ -30,6 +34,7 @@ void MonoSlam::restore(const SlamSnapshot& snapshot) {
 
 // What the body did meanwhile is known no better than at the start.
 void MonoSlam::widen_after_gap(double pause_s) {
+  pause_s = std::min(pause_s, kLongestPause);
   const SlamOptions& options = filter_.options();
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(filter_.layout().dim);
   const auto add = [&](int first, double sigma) { variance.segment<3>(first).array() += sigma * sigma; };
@@ -77,6 +82,13 @@ bool MonoSlam::process_frame(const FeaturesMeasurement& frame) {
   estimate_ = filter_.update(frame, next_status_).estimate;
   next_status_ = 0;
   ++used_;
+  if (!filter_.healthy()) {
+    // Nothing that was said is worth anything: what follows is another world.
+    estimate_.valid = 0;
+    filter_.stop();
+    ++diverged_;
+    next_status_ = kReinitialised;
+  }
   return true;
 }
 
@@ -84,7 +96,8 @@ NamedCounts MonoSlam::counts() const {
   NamedCounts out = {{"features.used", used_},
                      {"features.time_not_increasing", not_increasing_},
                      {"gaps", gaps_},
-                     {"starts", starts_}};
+                     {"starts", starts_},
+                     {"diverged", diverged_}};
   for (NamedCount& count : filter_.counts()) out.push_back(std::move(count));
   return out;
 }

@@ -53,6 +53,7 @@ class MonoSlam {
   std::int64_t not_increasing_ = 0;
   std::int64_t gaps_ = 0;
   std::int64_t starts_ = 0;
+  std::int64_t diverged_ = 0;
 };
 
 static_assert(Estimator<MonoSlam>);

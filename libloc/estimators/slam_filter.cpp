@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <set>
 #include <stdexcept>
 
 #include "libloc/core/check.hpp"
@@ -19,6 +20,7 @@ constexpr double kNonlinearSigmas = 1;  // so far from where the Jacobians say: 
 constexpr std::size_t kFewestForPose = 6;
 constexpr double kWidePx = 150;          // a prediction that is no better than this says where to look, and no more
 constexpr double kKnownDepthPart = 0.3;  // relative deviation of a depth that gives a place
+constexpr double kLeastSigmaPx = 1e-3;   // what no tracker does better
 constexpr double kFarthest = 27.9;       // chi-square of 6, 0.9999
 constexpr double kAbsurdPx = 1e4;        // a residual without meaning: the point is in the plane of the camera
 constexpr double kNarrowSigmas = 3;      // of a pixel's own deviation
@@ -111,10 +113,23 @@ void SlamFilter::start(TimeNs time_ns) {
   start(time_ns, state, Eigen::MatrixXd(sigma.array().square().matrix().asDiagonal()));
 }
 
+bool SlamFilter::healthy() const {
+  const auto finite = [](const Eigen::Quaterniond& q) { return q.coeffs().allFinite(); };
+  bool good = finite(state_.q_world_body) && finite(state_.T_body_camera.rotation) && state_.position.allFinite() &&
+              state_.velocity.allFinite() && state_.angular_velocity.allFinite();
+  for (int i = 0; i < layout_.dim && good; ++i) {
+    const double variance = covariance_(i, i);
+    good = std::isfinite(variance) && variance >= 0;
+  }
+  return good;
+}
+
 void SlamFilter::stop() {
   time_ns_ = kNoTime;
   landmarks_.clear();
   transition_.reset();
+  frame_.features.clear();
+  frame_.counts = SlamCounts{};
 }
 
 void SlamFilter::propagate(TimeNs time_ns) {
@@ -149,8 +164,12 @@ Eigen::MatrixXd SlamFilter::head_covariance() const {
   return transition_.f() * p * transition_.f().transpose() + transition_.q();
 }
 
+bool SlamFilter::sigma_is_usable(double sigma_px) const {
+  return sigma_px >= kLeastSigmaPx && sigma_px <= std::max(camera_.width_px(), camera_.height_px());
+}
+
 double SlamFilter::sigma_px(const FeaturesMeasurement& frame) const {
-  const bool says = !options_.override_sigma && std::isfinite(frame.sigma_px) && frame.sigma_px > 0;
+  const bool says = !options_.override_sigma && sigma_is_usable(frame.sigma_px);
   return says ? frame.sigma_px : options_.sigma_px;
 }
 
@@ -550,14 +569,13 @@ const SlamFrame& SlamFilter::update(const FeaturesMeasurement& frame, std::uint3
   frame_.nis = 0;
   frame_.iterations = 1;
   frame_.nis_dim = 0;
+  if (!std::isnan(frame.sigma_px) && !sigma_is_usable(frame.sigma_px)) ++sigma_not_usable_;
   bring_covariance_up();
   match(frame);
   select_measured(frame);
   update_agreeing(frame);
   rescue(frame);
   judge(frame);
-  const std::size_t expected = landmarks_.size();
-
   const Pose3 T_world_camera = state_.T_world_camera();
   frame_.camera_position = T_world_camera.translation;
   frame_.q_world_camera = T_world_camera.rotation;
@@ -581,7 +599,7 @@ const SlamFrame& SlamFilter::update(const FeaturesMeasurement& frame, std::uint3
   frame_.estimate.host_time_ns = frame.host_time_ns;
   frame_.estimate.sequence = frame.sequence;
   frame_.estimate.status |= status;
-  if (expected > 0 && counts.measured < kFewest) frame_.estimate.status |= kFewFeatures;
+  if (counts.measured + counts.added < kFewest) frame_.estimate.status |= kFewFeatures;
   if (counts.rejected > counts.measured) frame_.estimate.status |= kFeaturesRejected;
   frame_.time_spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return frame_;
@@ -688,6 +706,7 @@ NamedCounts SlamFilter::counts() const {
           {"slam.features", total_.in_frame},
           {"slam.features.not_usable", not_usable_},
           {"slam.features.ambiguous", ambiguous_},
+          {"slam.sigma_px.not_usable", sigma_not_usable_},
           {"slam.measured", total_.measured},
           {"slam.rescued", total_.rescued},
           {"slam.rejected", total_.rejected},
@@ -715,6 +734,25 @@ void SlamFilter::restore(const SlamSnapshot& snapshot) {
           "snapshot: the covariance does not fit its features (motion model, estimate_extrinsics or "
           "estimate_time_offset may differ)");
   require(snapshot.time_ns != kNoTime && snapshot.covariance.allFinite(), "snapshot: not finite, or without a time");
+  require((snapshot.covariance.diagonal().array() >= 0).all(), "snapshot: a variance is negative");
+  const SlamState& state = snapshot.state;
+  const auto is_rotation = [](const Eigen::Quaterniond& q) { return std::abs(q.norm() - 1) < 1e-6; };
+  require(is_rotation(state.q_world_body) && is_rotation(state.T_body_camera.rotation),
+          "snapshot: a quaternion is not of length 1");
+  require(state.position.allFinite() && state.velocity.allFinite() && state.angular_velocity.allFinite() &&
+              state.gyroscope_bias.allFinite() && state.accelerometer_bias.allFinite() &&
+              state.T_body_camera.translation.allFinite() && std::isfinite(state.time_offset_s),
+          "snapshot: the state is not finite");
+  std::set<std::int64_t> ids;
+  for (const SlamLandmark& landmark : snapshot.landmarks) {
+    const std::string name = "snapshot: feature " + std::to_string(landmark.id);
+    require(ids.insert(landmark.id).second, name + " comes twice");
+    const InverseDepthPoint& p = landmark.point.inverse_depth;
+    const bool finite = landmark.point.converted
+                            ? landmark.point.position.allFinite() && landmark.first.position.allFinite()
+                            : p.anchor.allFinite() && is_rotation(p.frame) && std::isfinite(p.inverse_depth);
+    require(finite && std::isfinite(landmark.tries) && std::isfinite(landmark.hits), name + " is not finite");
+  }
   time_ns_ = snapshot.time_ns;
   state_ = snapshot.state;
   first_ = snapshot.state;

@@ -108,6 +108,9 @@ class SlamFilter {
   /// Pose, velocity, biases, their covariance; stamp and sequence are the caller's.
   Estimate estimate() const;
   std::vector<SlamMapPoint> map() const;
+  /// State and variances of the head are finite, and no variance is negative. If not, numbers beyond all sense came in:
+  /// what is left is to start anew.
+  bool healthy() const;
   /// What has been counted since the start.
   NamedCounts counts() const;
 
@@ -140,6 +143,7 @@ class SlamFilter {
   double usual_inverse_depth() const;
   void add_known_landmarks();
 
+  bool sigma_is_usable(double sigma_px) const;
   double sigma_px(const FeaturesMeasurement& frame) const;
 
   SlamOptions options_;
@@ -179,6 +183,7 @@ class SlamFilter {
   std::int64_t frames_ = 0;
   std::int64_t ambiguous_ = 0;
   std::int64_t not_usable_ = 0;
+  std::int64_t sigma_not_usable_ = 0;
   std::int64_t failed_updates_ = 0;
   SlamCounts total_;
 };

@@ -160,8 +160,13 @@ void SlamFilter::make_room(int wanted) {
 void SlamFilter::add_landmarks(const FeaturesMeasurement& frame) {
   const SlamMapOptions& map = options_.map;
   const int found = static_cast<int>(frame_.counts.measured);
-  int wanted = map.min_visible - found;
+  int wanted = std::min(map.min_visible, map.max_measured) - found;
   if (found > 0) wanted = std::min(wanted, map.max_added);
+  // Nobody leaves for those who do not come.
+  const auto offered = std::count_if(by_id_.begin(), by_id_.end(), [&](const auto& entry) {
+    return taken_[static_cast<std::size_t>(entry.second)] == 0;
+  });
+  wanted = std::min(wanted, static_cast<int>(offered));
   candidates_.clear();
   if (wanted <= 0) return;
   make_room(wanted);

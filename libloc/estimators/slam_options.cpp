@@ -84,6 +84,8 @@ void SlamOptions::check() const {
   require_positive("sigma_extrinsic_rotation", sigma_extrinsic_rotation);
   require_positive("sigma_extrinsic_position", sigma_extrinsic_position);
   require_positive("sigma_time_offset", sigma_time_offset);
+  require(!estimate_time_offset || motion == SlamMotion::kInertial,
+          "estimate_time_offset: without an IMU there is no other clock");
   require_positive("max_gap_s", max_gap_s);
   start.check();
   moving_start.check();
@@ -94,6 +96,7 @@ void SlamOptions::check() const {
   require_positive("zero_velocity_sigma", zero_velocity_sigma);
   require_positive("zero_rate_sigma_floor", zero_rate_sigma_floor);
   require_positive("still_picture_px", still_picture_px);
+  require_positive("still_picture_s", still_picture_s);
   require_positive("max_imu_step_s", max_imu_step_s);
   require(max_imu_bridge_s >= max_imu_step_s, "max_imu_bridge_s", max_imu_bridge_s, "is below max_imu_step_s");
   require_positive("gap_acceleration_sigma", gap_acceleration_sigma);

@@ -117,8 +117,8 @@ void SlamTransition::move(SlamState& state, double dt_s, double acceleration_den
 void SlamTransition::move(SlamState& state, const InertialStep& step, const InertialStepNoise& noise,
                           const Eigen::Vector3d& gravity) {
   InertialJacobian jacobian = propagate(state, step, gravity, ImuIntegration::kMidpoint);
-  // The pull is that of the attitude in the middle of the step, and so is the error that turns it: only then is a turn of
-  // the world about the vertical carried over exactly, and stays unobservable.
+  // The pull is that of the attitude in the middle of the step, and so is the error that turns it: only then is a turn
+  // of the world about the vertical carried over exactly, and stays unobservable.
   jacobian.velocity_theta *= so3::exp(-0.5 * step.dt_s * step.angular_velocity).toRotationMatrix();
   state.angular_velocity = step.angular_velocity;
   Matrix15 f = f_.topLeftCorner<kInertialDim, kInertialDim>();

@@ -1,6 +1,7 @@
 #include "libloc/filter/large_covariance.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -358,7 +359,12 @@ bool LargeCovariance<Scalar>::update(std::span<const int> accepted, std::span<co
   blas::gemm(Transpose::kNo, Transpose::kNo, dim_, 1, m, Scalar(1), gain_.data(), leading_, y, m, Scalar(0), change,
              leading_);
   for (int i = 0; i < dim_; ++i) dx[i] = static_cast<double>(change[i]);
+  if (!std::isfinite(nis) || !dx.allFinite()) return false;
   blas::syrk_lower(dim_, m, Scalar(-1), gain_.data(), leading_, p_.data(), leading_);
+  if constexpr (sizeof(Scalar) == sizeof(float)) {
+    // What rounding takes from the smallest of many variances is more than its share: a millionth each time makes up.
+    for (int i = 0; i < dim_; ++i) p_[index(i, i)] *= Scalar(1 + 1e-6);
+  }
   mirror_head();
   return true;
 }
