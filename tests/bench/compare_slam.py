@@ -8,6 +8,7 @@ All get the same file (tracks_and_imu.csv) and nothing else:
     libloc camera     MonoSlam, default options: no IMU, lengths in a unit of its own
     EqVIO             GTSAM's equivariant filter (PyPI gtsam 4.3.0; --peer-python: of an environment of its
                       own), with the parameters that the file brings along for it; see peer_eqvio.py
+EqVIO's ATE is 0.0280 m here, scale 0.9976: the check of this script.
 libloc takes the deviation of the features from the file as well: the root of
 eqf.measurement_noise_variance_px, 1.93 px. Then the same from 6, 9, 12, 15 and 18 s on, while the drone flies
 (EqVIO is made for a start at rest). libloc's estimates of the time before a start is found are made once it
@@ -22,9 +23,10 @@ Required, and judged with ok or MISSED: inertial from the first frame ATE <= 0.0
 <= 1 ms a frame (of the program not judged); camera alone Sim(3) ATE <= 0.06 m, <= 1 ms.
 Exit code 1: a requirement is missed, a run failed, or the data or evo are not there.
 
-Truth: groundtruth_20hz.tum. Over windows of 0.5 s its turns are those of the gyroscope within 0.1 degrees of
-axes. groundtruth_200hz.tum are poses of something else: in the axes of the former turned by 5.5 degrees, 4 cm
-away along y, and its turns differ from the gyroscope's by 1.4 degrees of axes.
+Truth: groundtruth_20hz.tum. Over windows of 0.5 s its turns are those of the gyroscope, the axes agree within
+0.1 degrees. groundtruth_200hz.tum are poses of another body: against the former turned by 5.5 degrees (by up
+to 1.3 more or less in the course of the flight) and 4 cm away along y; its axes are 1.4 degrees from those of
+the gyroscope.
 
 --sensitivity: how much of the result is luck: other sigma_px and sigma_inverse_depth, other seeds of RANSAC,
 other first frames within the first second, in which the drone stands.

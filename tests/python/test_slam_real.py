@@ -10,6 +10,7 @@ import libloc
 
 sys.path.insert(0, str(CHECKOUT / "tests/bench"))
 import compare_slam
+import peer_eqvio
 
 
 @pytest.fixture(scope="module")
@@ -62,3 +63,13 @@ def test_no_data(tmp_path):
     )
     assert run.returncode == 1
     assert str(tmp_path / "tracks_and_imu.csv") in run.stderr
+
+
+def test_the_peer_gets_the_same(data):
+    for begin_s in (0, 6):
+        peer, ours = peer_eqvio.read(data[0].path, begin_s), data[0].after(begin_s)
+        assert [len(frame.features) for frame in peer.frames] == list(
+            ours.features.first[1:] - ours.features.first[:-1]
+        )
+        assert [gyro for _, gyro, _ in peer.imu] == ours.imu.angular_velocity.tolist()
+        assert [force for _, _, force in peer.imu] == ours.imu.specific_force.tolist()
