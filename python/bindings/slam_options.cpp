@@ -73,7 +73,9 @@ void bind_association_options(py::module_& m) {
                 "Which measurements are believed; every field is a keyword of the constructor.")
       .def(py::init([](const py::kwargs& fields) { return with_fields<O>("SlamAssociationOptions", fields); }),
            "TypeError for an unknown field, ValueError for a value out of range.")
-      .def_readwrite("gate_probability", &O::gate_probability, "Of a right measurement to pass: chi-square of 2.")
+      .def_readwrite("gate_probability", &O::gate_probability,
+                     "Of a right measurement to pass (chi-square of 2); 0: what gate() says.")
+      .def("gate", &O::gate, py::arg("motion"), "gate_probability, or its default for that motion model.")
       .def_readwrite("ransac", &O::ransac, "Hypotheses from one measurement each; without it the gate alone.")
       .def_readwrite("ransac_probability", &O::ransac_probability, "Of having tried one right measurement at least.")
       .def_readwrite("max_hypotheses", &O::max_hypotheses)
@@ -210,6 +212,7 @@ void bind_slam_options_struct(py::module_& m) {
       .def_readwrite("angular_acceleration_density", &O::angular_acceleration_density,
                      "Q, camera alone [rad/s^2/sqrt(Hz)].")
       .def_readwrite("imu_noise", &O::imu_noise, "Q, with an IMU; biases begin with its deviations.")
+      .def_readwrite("imu_sampling", &O::imu_sampling, "ImuSampling: what a sample of the IMU says.")
       .def_readwrite("vibration_part", &O::vibration_part,
                      "So much of the variance by which readings differ from sample to sample counts as white noise of "
                      "the IMU.")

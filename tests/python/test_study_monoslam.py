@@ -38,6 +38,7 @@ def outcome(**fields) -> study_monoslam_run.Outcome:
         "map_rms_m": 0.1,
         "nis": 95.0,
         "nis_dim": 100,
+        "gate": 0.95,
         "flagged": 0.0,
         "flagged_dark": float("nan"),
         "counts": {"rejected": 3},
@@ -149,11 +150,10 @@ def test_nees_of_a_run_is_that_of_numpy():
 
 
 def test_nis_within_a_gate():
-    case = CASES["look-at-plain"]
     gated = RNG.chisquare(2, size=200_000)
     gated = gated[gated < stats.chi2(2).ppf(0.95)]
-    assert study_monoslam.expected_nis(case) == pytest.approx(gated.mean() / 2, abs=5e-3)
-    assert study_monoslam.expected_nis(CASES["look-at-no-gate"]) == pytest.approx(1, abs=1e-4)
+    assert study_monoslam.expected_nis(0.95) == pytest.approx(gated.mean() / 2, abs=5e-3)
+    assert study_monoslam.expected_nis(0.999999) == pytest.approx(1, abs=1e-4)
 
 
 def test_nearest_consistency():

@@ -84,10 +84,8 @@ def tasks(options: argparse.Namespace, seeds: range) -> list[slam.Task]:
 run = slam.run
 
 
-def expected_nis(case: Case) -> float:
-    """Of one number, when only measurements within the gate count: chi-square of 2, cut."""
-    settings = dict(case.settings)
-    gate = settings.get("association.gate_probability", libloc.SlamAssociationOptions().gate_probability)
+def expected_nis(gate: float) -> float:
+    """Of one number, when only what passes the gate counts: chi-square of 2, cut at that probability."""
     bound = libloc.chi_square_quantile(gate, 2)
     return libloc.chi_square_cdf(bound, 4) / libloc.chi_square_cdf(bound, 2)
 
@@ -108,7 +106,7 @@ def _summary(case: Case, runs: list[slam.Outcome]) -> CaseSummary:
         float(np.degrees(np.sqrt(np.mean([one.turned_rms_rad**2 for one in runs])))),
         summarise(np.array([one.map_rms_m for one in runs])),
         sum(one.nis for one in runs) / dims if dims else float("nan"),
-        expected_nis(case),
+        expected_nis(runs[0].gate),
         sum(one.diverged for one in runs),
         counts,
     )

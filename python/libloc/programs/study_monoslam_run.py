@@ -58,6 +58,7 @@ class Outcome:
     map_rms_m: float  # over the well-known points of the map at the end; NaN without their truth
     nis: float  # sum over the frames
     nis_dim: int
+    gate: float  # probability of a right measurement to pass
     flagged: float  # share of the frames after which the filter says FEW_FEATURES
     flagged_dark: float  # of those without a feature; NaN when there are none
     counts: dict[str, int]  # sums over the frames
@@ -190,6 +191,7 @@ def run_case(case: Case, simulated: Simulated) -> Outcome:
         map_rms_m=_rms(np.linalg.norm(map_points - points, axis=1)),
         nis=float(np.sum(result.nis)),
         nis_dim=int(np.sum(result.nis_dim)),
+        gate=options.association.gate(options.motion),
         flagged=float(np.mean(few)),
         flagged_dark=float(np.mean(few[dark])) if dark.any() else float("nan"),
         counts={name: int(np.sum(values)) for name, values in result.counts.items()},
