@@ -156,17 +156,19 @@ def test_nis_within_a_gate():
     assert study_monoslam.expected_nis(0.999999) == pytest.approx(1, abs=1e-4)
 
 
-def test_nearest_consistency():
+def test_distance_from_a_right_nees():
     def blocks(nees: float) -> dict[str, study_monoslam.Nees]:
-        over_time = study_monoslam.consistency_over_time(RNG.chisquare(3, size=(5, 9)), 3)
+        over_time = study_monoslam.consistency_over_time(np.full((5, 9), nees), 3)
         return {name: study_monoslam.Nees(over_time, nees) for name in ("position", "orientation")}
 
-    table = {"a-plain": blocks(30.0), "a-first-estimate": blocks(4.0), "a-invariant": blocks(0.5)}
-    assert study_monoslam.recommend(table, ["a"]) == "first-estimate"
+    table = {"a-plain": blocks(30.0), "a-first-estimate": blocks(3.0), "a-invariant": blocks(1.0)}
+    expected = {"plain": np.log(10), "first-estimate": 0, "invariant": np.log(3)}
+    assert study_monoslam.distances(table, ["a"]) == pytest.approx(expected)
     table |= {"b-plain": blocks(3.0), "b-first-estimate": blocks(300.0), "b-invariant": blocks(3.0)}
-    assert study_monoslam.recommend(table, ["a", "b"]) == "invariant"
+    expected = {"plain": np.log(10) / 2, "first-estimate": np.log(10), "invariant": np.log(3) / 2}
+    assert study_monoslam.distances(table, ["a", "b"]) == pytest.approx(expected)
     del table["b-plain"]
-    assert study_monoslam.recommend(table, ["a", "b"]) is None
+    assert study_monoslam.distances(table, ["a", "b"]) == {}
 
 
 def test_requirements_that_are_missed_are_said():

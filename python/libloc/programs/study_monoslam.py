@@ -62,7 +62,7 @@ class Study:
     outcomes: Outcomes
     rows: list[CaseSummary]
     consistency: dict[str, dict[str, Nees]]  # by case and block
-    recommended: str | None  # of CONSISTENCY; None without all of them
+    distances: dict[str, float]  # of the treatments of consistency from a right NEES; empty without all rows
     requirements: list[Requirement]
     seeds: list[int]  # that all rows have
     quick: bool
@@ -127,24 +127,22 @@ def _nees(case: Case, runs: list[slam.Outcome]) -> dict[str, Nees]:
     return out
 
 
-def recommend(consistency: dict[str, dict[str, Nees]], worlds: Iterable[str]) -> str | None:
-    """The treatment whose NEES of position and orientation are nearest to right, over the worlds.
+def distances(consistency: dict[str, dict[str, Nees]], worlds: Iterable[str]) -> dict[str, float]:
+    """How far from right the NEES of position and orientation are with each treatment; 0 is right.
 
-    Nearest: by the mean over worlds and blocks of |log(median NEES / degrees of freedom)|.
+    The mean over worlds and blocks of |log(average NEES / degrees of freedom)|. Empty without all rows.
     """
-    distance: dict[str, list[float]] = {}
+    parts: dict[str, list[float]] = {}
     for world in worlds:
         for name in CONSISTENCY:
             blocks = consistency.get(f"{world}-{name}")
             if blocks is None:
-                return None
-            distance.setdefault(name, []).extend(
-                abs(np.log(blocks[block].median / blocks[block].over_time.dof))
+                return {}
+            parts.setdefault(name, []).extend(
+                abs(np.log(blocks[block].over_time.overall / blocks[block].over_time.dof))
                 for block in ("position", "orientation")
             )
-    if not distance:
-        return None
-    return min(distance, key=lambda name: float(np.mean(distance[name])))
+    return {name: float(np.mean(values)) for name, values in parts.items()}
 
 
 def evaluate(
@@ -166,7 +164,7 @@ def evaluate(
         outcomes,
         [_summary(case, runs[case.name]) for case in cases],
         consistency,
-        recommend(consistency, worlds),
+        distances(consistency, worlds),
         requirements(runs),
         sorted(common),
         options.quick,
@@ -210,12 +208,17 @@ def _consistency_text(study: Study) -> list[str]:
         f"[{first.lower:.2f}, {first.upper:.2f}]. NIS of one number is 1,",
         "  and less when only what passes the gate counts: (with gate).",
     ]
-    if study.recommended is not None:
+    if study.distances:
+        each = ", ".join(f"{name} {distance:.2f}" for name, distance in study.distances.items())
         lines.append(
-            f"  Nearest to right by the medians of position and orientation: {study.recommended}; the "
-            f"default is {_default_consistency()}."
+            f"  Distance from right, mean of |ln(NEES/3)| of position and orientation: {each}. Nearest: "
+            f"{_nearest(study)}; the default is {_default_consistency()}."
         )
     return lines
+
+
+def _nearest(study: Study) -> str | None:
+    return min(study.distances, key=study.distances.__getitem__) if study.distances else None
 
 
 def _default_consistency() -> str:
@@ -314,7 +317,8 @@ def as_dict(study: Study) -> dict[str, Any]:
             name: {block: _nees_dict(one) for block, one in blocks.items()}
             for name, blocks in study.consistency.items()
         },
-        "nearest_consistency": study.recommended,
+        "distance_from_right": study.distances,
+        "nearest_consistency": _nearest(study),
         "requirements": [
             {"name": one.text, "measured": one.measured, "held": one.held} for one in study.requirements
         ],

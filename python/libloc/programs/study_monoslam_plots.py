@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter
 
 from libloc.programs.study_monoslam_cases import CONSISTENCY, SETTLED_S, SPOILT, TABLES
 from libloc.programs.study_monoslam_run import BLOCKS, Floats, Outcome
@@ -26,6 +27,13 @@ def _figure(width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
+
+
+def _logarithmic(axes: Axes) -> None:
+    """The axis of y, with numbers that can be read where it spans less than a decade."""
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1, 0.5)))
 
 
 def _over_runs(runs: list[Outcome], curve: str) -> tuple[Floats, Floats]:
@@ -63,7 +71,11 @@ def plot_noise_ratio(study: Study, groups: list[str], path: Path) -> None:
         without, with_noise = _runs(study, f"{group}-0px"), _runs(study, f"{group}-1px")
         times, values = _curves(left, without, "error_m")
         right.plot(
-            times, NOISE_RATIO * values, color=_LIMIT, ls="--", label=f"{NOISE_RATIO:g} times that without"
+            times[1:],
+            NOISE_RATIO * values[1:],
+            color=_LIMIT,
+            ls="--",
+            label=f"{NOISE_RATIO:g} times that without",
         )
         _curves(right, with_noise, "error_m")
         label = next(one.case.label for one in study.rows if one.case.name == f"{group}-0px")
@@ -72,12 +84,9 @@ def plot_noise_ratio(study: Study, groups: list[str], path: Path) -> None:
         right.set_title(f"{label}: noise 1 px", fontsize=9)
         left.set_ylabel("position error [m]")
         for axes in (left, right):
-            axes.set_yscale("log")
+            _logarithmic(axes)
             axes.axvline(SETTLED_S, color="0.4", lw=0.8, ls=":")
             axes.grid(alpha=0.3)
-    largest = max(float(np.max(one.error_m)) for group in groups for one in _runs(study, f"{group}-1px"))
-    for left, _ in panels:
-        left.set_ylim(1e-5, 2 * largest)
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
     handles, labels = panels[0][1].get_legend_handles_labels()
@@ -194,7 +203,7 @@ def plot_consistency(study: Study, worlds: list[str], path: Path) -> None:
                 axes.plot(runs[0].times_s[-common:], values.mean(axis=0), color=colour, lw=1, label=label)
                 bounds = study.consistency[f"{world}-{name}"][block].over_time
                 axes.axhspan(bounds.lower, bounds.upper, color="0.9", lw=0)
-            axes.set_yscale("log")
+            _logarithmic(axes)
             axes.axhline(3, color="0.4", lw=0.8)
             axes.set_title(f"{world}: NEES {block}", fontsize=9)
             axes.grid(alpha=0.3)
@@ -219,7 +228,8 @@ def plot_robustness(study: Study, worlds: list[str], path: Path) -> None:
             if name == "dark":
                 middle = float(times[-1]) / 2
                 axes.axvspan(middle - DARK_S / 2, middle + DARK_S / 2, color="0.9", lw=0)
-        axes.set(yscale="log", xlabel="time [s]", ylabel="position error, RMS of the runs [m]", title=world)
+        _logarithmic(axes)
+        axes.set(xlabel="time [s]", ylabel="position error, RMS of the runs [m]", title=world)
         axes.grid(alpha=0.3)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4)
