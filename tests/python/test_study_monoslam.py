@@ -154,6 +154,12 @@ def test_nis_within_a_gate():
     gated = gated[gated < stats.chi2(2).ppf(0.95)]
     assert study_monoslam.expected_nis(0.95) == pytest.approx(gated.mean() / 2, abs=5e-3)
     assert study_monoslam.expected_nis(0.999999) == pytest.approx(1, abs=1e-4)
+    # A gate of 0 is the default of the motion model.
+    association = libloc.SlamAssociationOptions(gate_probability=0.9)
+    assert association.gate(libloc.SlamMotion.INERTIAL) == 0.9
+    association.gate_probability = 0
+    gates = [association.gate(motion) for motion in libloc.SlamMotion]
+    assert all(0.9 <= gate < 1 for gate in gates)
 
 
 def test_distance_from_a_right_nees():
