@@ -134,7 +134,7 @@ _SWEEPS: tuple[tuple[str, str, tuple[float, ...]], ...] = (
     ("angular_acceleration_density", "Q: angular [rad/s^2/sqrt(Hz)]", (0.1, 0.3, 1.0, 3.0, 10.0)),
     ("sigma_px", "R: root, noise is 1 px [px]", (0.3, 0.5, 1.0, 2.0, 4.0)),
     ("map.inverse_depth", "rho0, true ones 0.1 to 0.3 [1/m]", (0.05, 0.1, 0.3, 0.6, 1.0)),
-    ("map.sigma_inverse_depth", "sigma_rho [1/m]", (0.05, 0.1, 0.3, 0.6, 1.0)),
+    ("map.sigma_inverse_depth", "sigma_rho [1/m]", (0.05, 0.1, 0.2, 0.5, 1.0)),
     ("max_iterations", "iterations of an update", (1, 2, 3, 5, 8)),
     ("association.gate_probability", "gate", (0.9, 0.95, 0.99, 0.999)),
 )
