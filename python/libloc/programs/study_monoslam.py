@@ -4,7 +4,7 @@ Five tables: the simulation of K. Popov, "Monocular simultaneous location and ma
 filtering" (2015, section 5.1) with and without noise; several levels of noise; one setting at a time away
 from the base; NEES and NIS of the three treatments of consistency; and what bad tracks do. With --out also as
 CSV and JSON, with pictures. Position errors are in metres and not aligned: the start is given, and known
-landmarks or the IMU give the unit of lengths, but for the rows that say that there is no landmark.
+landmarks or the IMU give the unit of lengths, but for the rows that say otherwise.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 Tables:
   document     the look-at path with 0 and 1 px of noise, the filter told 1 px in both: with known landmarks
-               (metres), and without any, where the unit of lengths is that of the prior of depths
+               (metres), and without any, where the unit of lengths is that of the prior of depths: as it is,
+               and after the best similarity transform
   noise        the same path, known landmarks, several levels of noise; the filter is told what is true
   sweep        one setting at a time away from the base of the look-at path
   consistency  Civera's circle, the look-at path, and a device in the hand with an IMU: the three treatments
@@ -87,6 +88,7 @@ def _document() -> list[Case]:
     for name, label, settings, landmarks in (
         ("document", "as published: no landmark, depth 1", _DOCUMENT_PRIOR, 0),
         ("prior", "no landmark, default depth", (), 0),
+        ("shape", "the same after the best similarity", (), 0),
         ("metric", f"{LOOK_AT_LANDMARKS} known landmarks", (), LOOK_AT_LANDMARKS),
         (
             "cautious",
@@ -105,7 +107,8 @@ def _document() -> list[Case]:
                     _LOOK_AT + settings,
                     landmarks,
                     motion_known=True,
-                    picture=True,
+                    aligned=name == "shape",
+                    picture=name == "metric",
                     group=name,
                 )
             )

@@ -103,6 +103,7 @@ def requirements(runs: Runs) -> list[Requirement]:
     return [
         *_noise(runs, "document", "as published"),
         *_noise(runs, "prior", "default depth, no landmark"),
+        *_noise(runs, "shape", "no landmark, after the best similarity"),
         *_noise(runs, "metric", "known landmarks"),
         *_noise(runs, "cautious", "known landmarks, R = 3 px"),
         *_circle(runs, "plain"),
