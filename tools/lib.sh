@@ -17,6 +17,8 @@ jobs=${JOBS:-$(nproc)}
 
 # Caches of other programs would land in the user's home.
 export CCACHE_DIR=${CCACHE_DIR:-$cache_dir/ccache}
+# Precompiled headers are cached too (LOC_PRECOMPILED_TESTS).
+export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-pch_defines,time_macros}
 export PIP_CACHE_DIR=${PIP_CACHE_DIR:-$cache_dir/pip}
 export MPLCONFIGDIR=${MPLCONFIGDIR:-$cache_dir/matplotlib}
 export MPLBACKEND=Agg
