@@ -136,6 +136,7 @@ void visit_fields(Visitor& v, Options& o) requires std::is_same_v<std::remove_co
   v.field("acceleration_density", o.acceleration_density);
   v.field("angular_acceleration_density", o.angular_acceleration_density);
   v.block("imu_noise", o.imu_noise);
+  v.choice("imu_sampling", o.imu_sampling, kSamplings);
   v.field("vibration_part", o.vibration_part);
   v.field("gravity", o.gravity);
   v.field("sigma_px", o.sigma_px);
