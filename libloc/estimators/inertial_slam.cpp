@@ -9,21 +9,23 @@
 namespace loc {
 namespace {
 
-constexpr int kSetBackAfter = 20;           // samples in a row on an earlier time line
-constexpr std::size_t kMostWaiting = 256;   // frames without an IMU sample after them
-constexpr TimeNs kRestEvery = 100'000'000;  // between two uses of rest [ns]
-constexpr int kTryEvery = 5;                // frames from one try of a start in motion to the next
-constexpr double kVibrationTime = 0.1;      // over which shaking is averaged [s]
-constexpr double kLongestHold = 0.5;        // of samples for frames [s]
-constexpr double kFarthestAhead = 10;       // of the IMU: a frame is on another clock [s]
-constexpr double kStillAtStart = 2;         // times as much may a body sway before the start
-constexpr double kPictureIsOld = 0.5;       // says nothing of now [s]
-constexpr double kFarthestWay = 100;        // deviation of a place after a gap [m]
-constexpr double kAnyHeading = 1.8;         // deviation of any angle in a turn [rad]
-constexpr double kRecoverAngle = 0.02;      // what is unknown after a contradiction [rad]
-constexpr double kRecoverPosition = 0.1;    // [m]
-constexpr double kRecoverVelocity = 0.5;    // [m/s]
-constexpr int kFewestStill = 5;             // features that tell whether the picture stands still
+constexpr int kSetBackAfter = 20;                            // samples in a row on an earlier time line
+constexpr std::size_t kMostWaiting = 256;                    // frames without an IMU sample after them
+constexpr int kTryEvery = 5;                                 // frames from one try of a start in motion to the next
+constexpr double kVibrationTime = 0.1;                       // over which shaking is averaged [s]
+constexpr double kLongestHold = 0.5;                         // of samples for frames [s]
+constexpr double kFarthestAhead = 10;                        // of the IMU: a frame is on another clock [s]
+constexpr double kLeastDepthPart = 0.02;                     // deviation of a depth that a start found, at least
+constexpr double kStillAtStart = 2;                          // times as much may a body sway before the start
+constexpr double kPictureIsOld = 0.5;                        // says nothing of now [s]
+constexpr double kFarthestWay = 100;                         // deviation of a place after a gap [m]
+constexpr TimeNs kFarthestTime = 2'000'000'000'000'000'000;  // half of a time whose differences can be taken [ns]
+constexpr std::size_t kUsualFeatures = 1000;                 // of a frame; more take memory once
+constexpr double kAnyHeading = 1.8;                          // deviation of any angle in a turn [rad]
+constexpr double kRecoverAngle = 0.02;                       // what is unknown after a contradiction [rad]
+constexpr double kRecoverPosition = 0.1;                     // [m]
+constexpr double kRecoverVelocity = 0.5;                     // [m/s]
+constexpr int kFewestStill = 5;                              // features that tell whether the picture stands still
 
 double square(double x) {
   return x * x;
@@ -64,6 +66,9 @@ InertialSlam::InertialSlam(const SlamOptions& options)
       moving_start_(moving_start_options(options), options.camera, options.imu_noise, options.gravity),
       rest_(options.stand_still, options.imu_noise, options.gravity) {
   require(options.motion == SlamMotion::kInertial, "motion: InertialSlam needs an IMU, MonoSlam does without");
+  picture_.reserve(kUsualFeatures);
+  picture_before_.reserve(kUsualFeatures);
+  for (std::vector<double>& moves : moves_) moves.reserve(kUsualFeatures);
 }
 
 void InertialSlam::skip(const char* count, std::uint32_t status) {
@@ -148,7 +153,8 @@ TimeNs InertialSlam::on_imu_clock(TimeNs camera_time_ns) const {
 }
 
 void InertialSlam::process_frame(const FeaturesMeasurement& frame) {
-  if (newest_ns_ != kNoTime && to_seconds(frame.time_ns - newest_ns_) > kFarthestAhead) {
+  if (std::abs(frame.time_ns / 2) > kFarthestTime ||
+      (newest_ns_ != kNoTime && to_seconds(frame.time_ns - newest_ns_) > kFarthestAhead)) {
     skip("features.skipped.out_of_range", kOutOfRange);
     return;
   }
@@ -170,6 +176,10 @@ void InertialSlam::process_frame(const FeaturesMeasurement& frame) {
 }
 
 bool InertialSlam::usable(const ImuMeasurement& imu) {
+  if (std::abs(imu.time_ns / 2) > kFarthestTime) {
+    skip("imu.skipped.out_of_range", kOutOfRange);
+    return false;
+  }
   if (!imu.angular_velocity.allFinite() || !imu.specific_force.allFinite()) {
     skip("imu.skipped.not_finite", kNotFinite);
     return false;
@@ -267,6 +277,11 @@ bool InertialSlam::start_moving() {
   factor.setConstant(options().moving_start_factor);
   factor.segment<3>(kAccelerometerBias).setOnes();
   begin(found->time_ns, found->state, factor.asDiagonal() * found->covariance * factor.asDiagonal(), "starts.moving");
+  for (const SlamStartFeature& point : found->points) {
+    const double sigma =
+        std::max(options().moving_start_factor * point.sigma, kLeastDepthPart * point.inverse_distance);
+    filter_.expect_depth(point.id, point.inverse_distance, sigma);
+  }
   replay_early();
   return true;
 }
@@ -316,6 +331,7 @@ void InertialSlam::begin(TimeNs time_ns, const InertialState& from,
   }
   ++counts_[count];
   filter_.start(time_ns, state, covariance);
+  frame_status_ = 0;
   last_good_frame_ns_ = time_ns;
   carried_.reset();
   // Frames from before the start have no place in it.
@@ -359,8 +375,8 @@ InertialStepNoise InertialSlam::noise_of(double dt_s) const {
 }
 
 void InertialSlam::see_vibration(const ImuMeasurement& imu) {
-  const double dt = to_seconds(imu.time_ns - vibration_.last.time_ns);
-  if (vibration_.last.time_ns != kNoTime && dt > 0 && dt < options().max_imu_step_s) {
+  const double dt = vibration_.last.time_ns == kNoTime ? 0 : to_seconds(imu.time_ns - vibration_.last.time_ns);
+  if (dt > 0 && dt < options().max_imu_step_s) {
     const double part = std::min(1.0, dt / kVibrationTime);
     const auto see = [&](double& mean, const Eigen::Vector3d& now, const Eigen::Vector3d& then) {
       mean += part * ((now - then).squaredNorm() / 6 - mean);
@@ -521,6 +537,7 @@ void InertialSlam::take_frame(const FeaturesMeasurement& frame) {
   const SlamFrame& done = filter_.update(frame, status_ | (at_rest_ ? kAtRest : 0U));
   ++frames_used_;
   if ((done.estimate.status & kFewFeatures) == 0) last_good_frame_ns_ = filter_.time_ns();
+  frame_status_ = done.estimate.status & (kFewFeatures | kFeaturesRejected);
   recover(done);
   if (frame_count_ == frames_.size()) frames_.emplace_back();
   SlamFrame& out = frames_[frame_count_++];
@@ -551,7 +568,7 @@ void InertialSlam::look_for_rest(const ImuMeasurement& imu) {
   }
   if (!options().zero_velocity) {
     at_rest_ = true;
-  } else if (rest_used_ns_ == kNoTime || imu.time_ns - rest_used_ns_ >= kRestEvery) {
+  } else if (rest_used_ns_ == kNoTime || imu.time_ns - rest_used_ns_ >= from_seconds(options().stand_still.window_s)) {
     rest_used_ns_ = imu.time_ns;
     const double sigma_rate = std::hypot(rest_.mean_rate_sigma(), options().zero_rate_sigma_floor);
     at_rest_ = filter_.zero_velocity(options().zero_velocity_sigma, rest_.mean_rate(), sigma_rate);
@@ -567,7 +584,7 @@ Estimate InertialSlam::estimate() const {
     out.status = status_ | kInitialising;
   } else {
     out = filter_.estimate();
-    out.status |= status_;
+    out.status |= status_ | frame_status_;
   }
   out.time_ns = last_.time_ns;
   out.host_time_ns = last_.host_time_ns;

@@ -126,6 +126,7 @@ class InertialSlam {
   TimeNs rest_used_ns_ = kNoTime;
   bool restored_ = false;
   int set_back_in_a_row_ = 0;
+  std::uint32_t frame_status_ = 0;  // of the last frame
   std::uint32_t status_ = 0;
   std::uint32_t next_status_ = 0;
   std::int64_t imu_used_ = 0;

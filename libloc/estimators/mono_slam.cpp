@@ -1,6 +1,7 @@
 #include "libloc/estimators/mono_slam.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "libloc/core/check.hpp"
 
@@ -10,6 +11,7 @@ namespace {
 // Frames in a row on an earlier time line that mean: the clock was set back.
 constexpr int kSetBackAfter = 10;
 // What is unknown after longer is no less known: the numbers must stay such that one can calculate with them. [s]
+constexpr TimeNs kFarthestTime = 2'000'000'000'000'000'000;  // half of a time whose differences can be taken [ns]
 constexpr double kLongestPause = 30;
 
 }  // namespace
@@ -51,6 +53,11 @@ bool MonoSlam::process(const Measurement& measurement) {
 }
 
 bool MonoSlam::process_frame(const FeaturesMeasurement& frame) {
+  if (std::abs(frame.time_ns / 2) > kFarthestTime) {
+    ++out_of_range_;
+    next_status_ |= kOutOfRange;
+    return false;
+  }
   // The camera's clock is all that there is.
   if (!filter_.started()) {
     filter_.start(frame.time_ns);
@@ -95,6 +102,7 @@ bool MonoSlam::process_frame(const FeaturesMeasurement& frame) {
 NamedCounts MonoSlam::counts() const {
   NamedCounts out = {{"features.used", used_},
                      {"features.time_not_increasing", not_increasing_},
+                     {"features.out_of_range", out_of_range_},
                      {"gaps", gaps_},
                      {"starts", starts_},
                      {"diverged", diverged_}};

@@ -51,6 +51,7 @@ class MonoSlam {
   int set_back_in_a_row_ = 0;
   std::int64_t used_ = 0;
   std::int64_t not_increasing_ = 0;
+  std::int64_t out_of_range_ = 0;
   std::int64_t gaps_ = 0;
   std::int64_t starts_ = 0;
   std::int64_t diverged_ = 0;

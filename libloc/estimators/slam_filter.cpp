@@ -21,9 +21,10 @@ constexpr std::size_t kFewestForPose = 6;
 constexpr double kWidePx = 150;          // a prediction that is no better than this says where to look, and no more
 constexpr double kKnownDepthPart = 0.3;  // relative deviation of a depth that gives a place
 constexpr double kLeastSigmaPx = 1e-3;   // what no tracker does better
-constexpr double kFarthest = 27.9;       // chi-square of 6, 0.9999
-constexpr double kAbsurdPx = 1e4;        // a residual without meaning: the point is in the plane of the camera
-constexpr double kNarrowSigmas = 3;      // of a pixel's own deviation
+constexpr std::size_t kUsualFeatures = 1000;  // of a frame; more take memory once
+constexpr double kFarthest = 27.9;            // chi-square of 6, 0.9999
+constexpr double kAbsurdPx = 1e4;             // a residual without meaning: the point is in the plane of the camera
+constexpr double kNarrowSigmas = 3;           // of a pixel's own deviation
 
 double square(double x) {
   return x * x;
@@ -70,6 +71,8 @@ SlamFilter::SlamFilter(const SlamOptions& options)
   sighted_.reserve(features);
   cells_.resize(static_cast<std::size_t>(options.map.grid_columns * options.map.grid_rows));
   frame_.features.reserve(2 * features);
+  by_id_.reserve(kUsualFeatures);
+  taken_.reserve(kUsualFeatures);
 }
 
 void SlamFilter::start(TimeNs time_ns, const SlamState& state, const Eigen::MatrixXd& covariance) {
@@ -81,7 +84,14 @@ void SlamFilter::start(TimeNs time_ns, const SlamState& state, const Eigen::Matr
   covariance_.reset(covariance);
   frame_.counts = SlamCounts{};
   frame_.features.clear();
+  expected_.clear();
   add_known_landmarks();
+}
+
+void SlamFilter::expect_depth(std::int64_t id, double inverse_depth, double sigma) {
+  const auto place = std::lower_bound(expected_.begin(), expected_.end(), id,
+                                      [](const ExpectedDepth& one, std::int64_t other) { return one.id < other; });
+  expected_.insert(place, {id, inverse_depth, sigma});
 }
 
 void SlamFilter::start(TimeNs time_ns) {
@@ -250,6 +260,21 @@ bool SlamFilter::approach(const FeaturesMeasurement& frame, SlamState& near) {
                                               square(std::isfinite(usual) ? usual : options_.map.inverse_depth) *
                                                   prior_cov.bottomRightCorner<3, 3>().trace());
   if (!(wide_px > kWidePx)) return false;
+  // What the map shares (place and heading of the world) is not seen: how far pixels may be off decides.
+  depths_.clear();
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    SlamLandmark& landmark = landmarks_[i];
+    if (landmark.observation < 0) continue;
+    BlockMeasurement& m = measurements_[i];
+    m.noise_cov.topLeftCorner<2, 2>().setZero();
+    const Eigen::Vector2d& pixel = frame.features[static_cast<std::size_t>(landmark.observation)].pixel_px;
+    const bool seen = linearise(landmark, pixel, m);
+    depths_.push_back(seen ? std::sqrt(covariance_.innovation_cov(m).topLeftCorner<2, 2>().trace()) : kAbsurdPx);
+  }
+  if (depths_.size() < kFewestForPose) return false;
+  const auto middle = depths_.begin() + static_cast<std::ptrdiff_t>(depths_.size() / 2);
+  std::nth_element(depths_.begin(), middle, depths_.end());
+  if (!(*middle > kWidePx)) return false;
   // Directions to those points whose place is known.
   sighted_.clear();
   for (const SlamLandmark& landmark : landmarks_) {
@@ -440,16 +465,29 @@ void SlamFilter::iterate(const FeaturesMeasurement& frame) {
         BlockMeasurement& m = measurements_[at];
         const Eigen::Vector2d& z = frame.features[static_cast<std::size_t>(landmarks_[at].observation)].pixel_px;
         good = linearise(landmarks_[at], z, m);
+        if (!good) break;
         const Eigen::Vector2d r = m.residual.head<2>() + moved_by(m);
         accepted_residual_[k] = r[0];
         accepted_residual_[k + 1] = r[1];
       }
-      covariance_.innovate(measurements_, which_);
     }
     // x_0 again: the update takes it to where it belongs.
     state_ = prior;
     for (std::size_t k = 0; k < landmarks_.size(); ++k) landmarks_[k].point = points_before_[k];
-    if (!again || !good) return;
+    if (!again) return;
+    if (!good) {
+      // Half of it is at another place: all of it at the prior again.
+      for (std::size_t k = 0; k < accepted_.size(); k += 2) {
+        const auto at = static_cast<std::size_t>(which_[static_cast<std::size_t>(accepted_[k]) / 2]);
+        BlockMeasurement& m = measurements_[at];
+        const Eigen::Vector2d& z = frame.features[static_cast<std::size_t>(landmarks_[at].observation)].pixel_px;
+        linearise(landmarks_[at], z, m);
+        accepted_residual_[k] = m.residual[0];
+        accepted_residual_[k + 1] = m.residual[1];
+      }
+    }
+    covariance_.innovate(measurements_, which_);
+    if (!good) return;
     ++frame_.iterations;
   }
 }
@@ -527,6 +565,7 @@ void SlamFilter::judge(const FeaturesMeasurement& frame) {
     ++counts.measured;
     ++landmark.measured;
     landmark.last_measured_ns = time_ns_;
+    landmark.last_measured_frame = frames_;
     landmark.last_visible_ns = time_ns_;
     const Eigen::Vector2d& pixel = frame.features[static_cast<std::size_t>(landmark.observation)].pixel_px;
     before += (pixel - landmark.predicted_px).squaredNorm();
@@ -758,6 +797,8 @@ void SlamFilter::restore(const SlamSnapshot& snapshot) {
   first_ = snapshot.state;
   landmarks_ = snapshot.landmarks;
   landmarks_.reserve(static_cast<std::size_t>(options_.map.max_features));
+  for (SlamLandmark& landmark : landmarks_)
+    landmark.last_measured_frame = -1;  // of another run: older than all of this
   covariance_.set_dense(snapshot.covariance);
   transition_.reset();
 }

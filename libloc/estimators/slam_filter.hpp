@@ -45,6 +45,7 @@ struct SlamLandmark {
   double hits = 0;   ///< and was measured
   std::int64_t measured = 0;
   TimeNs last_measured_ns = kNoTime;
+  std::int64_t last_measured_frame = -1;  ///< counted by the filter, whatever clocks do
   TimeNs last_visible_ns = kNoTime;
   bool known = false;  ///< its place was given
   // Of the frame at hand.
@@ -85,6 +86,10 @@ class SlamFilter {
   void propagate(TimeNs time_ns, const InertialStep& step, const InertialStepNoise& noise);
   /// Head's variances grow: what happened meanwhile is not known. @param variance of each error of the head
   void widen(const Eigen::VectorXd& variance);
+
+  /// Of features that are not in the map yet: their depth is known (from the start in motion). Until the next start().
+  /// @param inverse_depth along the ray from the camera now [1/m] @param sigma its deviation [1/m]
+  void expect_depth(std::int64_t id, double inverse_depth, double sigma);
 
   /// A frame at time_ns(). The result holds until the next call. @param status EstimateStatus to be said with it
   const SlamFrame& update(const FeaturesMeasurement& frame, std::uint32_t status = 0);
@@ -173,6 +178,12 @@ class SlamFilter {
   std::vector<char> agrees_;
   bool approached_ = false;  // the Jacobians of this frame are at another pose than the prior's
   std::vector<int> cells_;
+  struct ExpectedDepth {
+    std::int64_t id;
+    double inverse_depth;
+    double sigma;
+  };
+  std::vector<ExpectedDepth> expected_;  // by identity
   mutable std::vector<double> depths_;
   std::vector<SightedPoint> sighted_;
   Eigen::VectorXd dx_;

@@ -126,6 +126,7 @@ bool SlamFilter::add_landmark(const FeatureObservation& observation, double inve
   landmark.tries = landmark.hits = 1;
   landmark.last_visible_ns = time_ns_;
   landmark.last_measured_ns = time_ns_;
+  landmark.last_measured_frame = frames_;
   landmark.visible = true;
   landmark.state = SlamFeatureState::kNew;
   landmark.predicted_px = observation.pixel_px;
@@ -133,7 +134,7 @@ bool SlamFilter::add_landmark(const FeatureObservation& observation, double inve
   return true;
 }
 
-// Who has not been in view for longest leaves, if anybody must.
+// Who has not been measured for longest leaves, if anybody must.
 void SlamFilter::make_room(int wanted) {
   const auto room = options_.map.max_features - static_cast<int>(landmarks_.size());
   int lack = wanted - room;
@@ -147,7 +148,7 @@ void SlamFilter::make_room(int wanted) {
   std::sort(candidates_.begin(), candidates_.end(), [&](int a, int b) {
     const SlamLandmark& x = landmarks_[static_cast<std::size_t>(a)];
     const SlamLandmark& y = landmarks_[static_cast<std::size_t>(b)];
-    return std::pair(x.last_measured_ns, x.id) < std::pair(y.last_measured_ns, y.id);
+    return std::pair(x.last_measured_frame, x.id) < std::pair(y.last_measured_frame, y.id);
   });
   marked_.assign(landmarks_.size(), 0);
   for (const int i : candidates_) {
@@ -209,7 +210,13 @@ void SlamFilter::add_landmarks(const FeaturesMeasurement& frame) {
              (frame.features[static_cast<std::size_t>(landmark.observation)].pixel_px - feature.pixel_px)
                      .squaredNorm() < nearest;
     });
-    if (crowded || !add_landmark(feature, rho, sigma)) continue;
+    if (crowded) continue;
+    const auto expected = std::lower_bound(expected_.begin(), expected_.end(), feature.id,
+                                           [](const ExpectedDepth& one, std::int64_t id) { return one.id < id; });
+    const bool hint = expected != expected_.end() && expected->id == feature.id;
+    if (!(hint ? add_landmark(feature, expected->inverse_depth, expected->sigma) : add_landmark(feature, rho, sigma))) {
+      continue;
+    }
     landmarks_.back().observation = best;
     ++cells_[cell_of(feature.pixel_px)];
     --wanted;

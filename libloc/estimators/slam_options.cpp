@@ -46,6 +46,8 @@ void SlamMapOptions::check() const {
   require_not_negative("map.border_px", border_px);
   require_positive("map.inverse_depth", inverse_depth);
   require_positive("map.sigma_inverse_depth", sigma_inverse_depth);
+  require(2 * sigma_inverse_depth >= inverse_depth, "map.sigma_inverse_depth", sigma_inverse_depth,
+          "must be at least half of map.inverse_depth: a point at infinity is within two deviations");
   require_not_negative("map.max_linearity_index", max_linearity_index);
   require_at_least("map.delete_after_tries", delete_after_tries, 2);
   require(delete_below_ratio >= 0 && delete_below_ratio <= 1, "map.delete_below_ratio", delete_below_ratio,
