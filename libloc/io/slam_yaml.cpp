@@ -158,6 +158,7 @@ void visit_fields(Visitor& v, Options& o) requires std::is_same_v<std::remove_co
   v.field("zero_velocity_sigma", o.zero_velocity_sigma);
   v.field("zero_rate_sigma_floor", o.zero_rate_sigma_floor);
   v.field("still_picture_px", o.still_picture_px);
+  v.field("still_picture_s", o.still_picture_s);
   v.field("max_imu_step_s", o.max_imu_step_s);
   v.field("max_imu_bridge_s", o.max_imu_bridge_s);
   v.field("gap_acceleration_sigma", o.gap_acceleration_sigma);

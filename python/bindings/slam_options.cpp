@@ -242,7 +242,8 @@ void bind_slam_options_struct(py::module_& m) {
       .def_readwrite("zero_rate_sigma_floor", &O::zero_rate_sigma_floor,
                      "What a body at rest may turn, earth rate included [rad/s].")
       .def_readwrite("still_picture_px", &O::still_picture_px,
-                     "Features move less from frame to frame: the picture stands still [px].")
+                     "The picture is, as a whole, that near to where it was: it stands still … [px].")
+      .def_readwrite("still_picture_s", &O::still_picture_s, "… when it has been for so long [s].")
       .def_readwrite("max_imu_step_s", &O::max_imu_step_s, "A longer step is a gap: bridged with more noise [s].")
       .def_readwrite("max_imu_bridge_s", &O::max_imu_bridge_s, "Beyond it a new start [s].")
       .def_readwrite("gap_acceleration_sigma", &O::gap_acceleration_sigma, "What the body may do in a gap [m/s^2].")
