@@ -5,8 +5,8 @@
 
 #include "libloc/core/random.hpp"
 #include "libloc/filter/blas.hpp"
-#include "libloc/sensors/measurements.hpp"
 #include "libloc/filter/large_covariance.hpp"
+#include "libloc/sensors/measurements.hpp"
 #include "support/numeric_jacobian.hpp"
 
 namespace loc {
