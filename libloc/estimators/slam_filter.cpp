@@ -316,9 +316,15 @@ void SlamFilter::select_measured(const FeaturesMeasurement& frame) {
   approached_ = approach(frame, state_);
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     SlamLandmark& landmark = landmarks_[i];
-    if (landmark.observation < 0) continue;
     BlockMeasurement& measurement = measurements_[i];
     measurement.noise_cov.topLeftCorner<2, 2>() = sigma * sigma * Eigen::Matrix2d::Identity();
+    if (landmark.observation < 0) {
+      // Where to look for it, and how far around.
+      if (landmark.visible && linearise(landmark, landmark.predicted_px, measurement)) {
+        landmark.innovation_cov = covariance_.innovation_cov(measurement).topLeftCorner<2, 2>();
+      }
+      continue;
+    }
     const Eigen::Vector2d& pixel = frame.features[static_cast<std::size_t>(landmark.observation)].pixel_px;
     if (!linearise(landmark, pixel, measurement)) {
       landmark.state = SlamFeatureState::kRejected;

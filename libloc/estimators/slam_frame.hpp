@@ -60,6 +60,11 @@ struct SlamFrame : Stamp {
   std::vector<SlamFeature> features;
 };
 
+/// The frame's pose as visual odometry of unknown scale, with its covariance: what the error-state filter fuses with an
+/// IMU (the loosely coupled way; poses that are far apart share errors which this does not say).
+/// @throws std::invalid_argument when the estimate has no pose or no covariance.
+OdometryMeasurement odometry_of(const SlamFrame& frame);
+
 struct SlamMapPoint {
   std::int64_t id = -1;
   bool converted = false;                                              ///< XYZ; otherwise inverse depth

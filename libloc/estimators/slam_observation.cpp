@@ -5,6 +5,9 @@
 namespace loc {
 namespace {
 
+// Features that are seen first together share their anchor. A hair between them keeps the covariance positive definite.
+constexpr double kAnchorSigma = 1e-5;  // [m]
+
 // What the camera looks along: direction in world, and what rho is (1 for an XYZ point).
 struct Sight {
   Eigen::Vector3d world;
@@ -104,6 +107,7 @@ std::optional<SlamBirth> make_feature(const SlamState& state, const SlamLayout& 
   }
   const Eigen::Matrix2d by_pixel = by_body * to_body * ray->d_pixel;
   out.noise_cov.setZero();
+  out.noise_cov.diagonal().segment<3>(kAnchor).setConstant(kAnchorSigma * kAnchorSigma);
   out.noise_cov.block<2, 2>(kRay, kRay) = sigma_px * sigma_px * by_pixel * by_pixel.transpose();
   out.noise_cov(kInverseDepth, kInverseDepth) = sigma_inverse_depth * sigma_inverse_depth;
   return out;

@@ -6,6 +6,7 @@
 
 #include "libloc/core/check.hpp"
 #include "libloc/core/statistics.hpp"
+#include "libloc/estimators/inertial_fusion.hpp"
 #include "libloc/estimators/inertial_slam.hpp"
 #include "libloc/estimators/mono_slam.hpp"
 #include "libloc/eval/trajectory_error.hpp"
@@ -95,6 +96,43 @@ TEST(MonoSlam, FindsTheRideButForItsUnit) {
   EXPECT_LT(out.ate(AlignmentMode::kSim3), 0.06);
   EXPECT_NE(out.last.status & kScaleUnknown, 0U);
   EXPECT_EQ(out.last.covariance_dim, 9);
+}
+
+// The loosely coupled way: the camera alone is the odometry, the error-state filter finds its scale with the IMU.
+TEST(MonoSlam, IsTheOdometryOfTheErrorStateFilter) {
+  MonoSlam slam(ride_options(SlamMotion::kConstantVelocity));
+  InertialFusionOptions options = InertialFusionOptions::robust();
+  options.odometry = OdometryUse::kRelative;
+  options.filter.noise = ImuNoise{};
+  InertialFusion fusion(options);
+  SlamRide world({});
+  Trajectory estimate;
+  Trajectory truth;
+  double scale = 0;
+  world.run(20, [&](const Measurement& measurement) {
+    if (slam.process(measurement)) {
+      OdometryMeasurement odometry = odometry_of(slam.frame());
+      odometry.position_cov.diagonal().array() += 1e-6;  // the first pose is exact by definition
+      odometry.orientation_cov.diagonal().array() += 1e-8;
+      fusion.process(odometry);
+    }
+    if (!std::holds_alternative<ImuMeasurement>(measurement) || !fusion.process(measurement)) return;
+    const Estimate now = fusion.estimate();
+    const double t = SlamRide::time_s(now.time_ns);
+    scale = now.scale;
+    if (t < 5 || (now.valid & kValidPosition) == 0) return;
+    estimate.times_ns.push_back(now.time_ns);
+    estimate.poses.push_back({now.q_world_body, now.position});
+    truth.times_ns.push_back(now.time_ns);
+    truth.poses.push_back(world.pose(t));
+  });
+  ASSERT_GT(estimate.times_ns.size(), 2000U);
+  const auto sim3 = absolute_error(estimate, truth, AlignmentMode::kSim3);
+  EXPECT_NEAR(sim3.alignment.scale, 1, 0.1) << "metres";
+  EXPECT_LT(absolute_error(estimate, truth, AlignmentMode::kSe3).translation.rmse, 0.3);
+  EXPECT_GT(std::abs(scale - 1), 0.02) << "the odometry's unit is not the metre";
+  SlamFrame empty;
+  EXPECT_THROW(odometry_of(empty), std::invalid_argument);
 }
 
 // A target of known size fixes the unit; position and heading of world come with it.
