@@ -50,16 +50,17 @@ void TriadCalibration::check(const std::string& name) const {
 }
 
 void CameraCalibration::check() const {
-  require(width_px > 0 && height_px > 0, name + ".resolution: must be positive");
+  const std::string who = name.empty() ? "camera" : name;
+  require(width_px > 0 && height_px > 0, who + ".resolution: must be positive");
   require(intrinsics_px.allFinite() && intrinsics_px.head<2>().minCoeff() > 0,
-          name + ".intrinsics: must be finite, with positive focal lengths");
-  require(distortion.allFinite(), name + ".distortion_coeffs: must be finite");
-  require(T_body_camera.translation.allFinite(), name + ".T_cam_imu: must be finite");
+          who + ".intrinsics: must be finite, with positive focal lengths");
+  require(distortion.allFinite(), who + ".distortion_coeffs: must be finite");
+  require(T_body_camera.translation.allFinite(), who + ".T_cam_imu: must be finite");
   // The comparison is false for NaN.
   const double norm = T_body_camera.rotation.norm();
-  require(std::abs(norm - 1) < 1e-6, name + ".T_cam_imu: norm of its rotation", norm, "must be 1");
-  require_finite(name + ".timeshift_cam_imu", time_offset_s);
-  require_not_negative(name + ".rate_hz", rate_hz);
+  require(std::abs(norm - 1) < 1e-6, who + ".T_cam_imu: norm of its rotation", norm, "must be 1");
+  require_finite(who + ".timeshift_cam_imu", time_offset_s);
+  require_not_negative(who + ".rate_hz", rate_hz);
 }
 
 void ClockCalibration::check() const {

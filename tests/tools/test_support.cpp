@@ -319,6 +319,13 @@ TEST(AnyEstimator, NamesLeadToEstimators) {
   for (const std::string& name : estimator_methods()) {
     EstimatorSettings settings;
     settings.method = name;
+    if (name.find("slam") != std::string::npos) {
+      EXPECT_THROW(make_estimator(settings), std::invalid_argument) << "there is no camera";
+      settings.slam.camera.width_px = 640;
+      settings.slam.camera.height_px = 480;
+      settings.slam.camera.intrinsics_px = {400, 400, 320, 240};
+      settings.slam.motion = name == "mono-slam" ? SlamMotion::kConstantVelocity : SlamMotion::kInertial;
+    }
     EXPECT_EQ(make_estimator(settings).method(), name);
   }
   EstimatorSettings wrong;
