@@ -9,7 +9,7 @@ import numpy.typing
 import os
 import typing
 from . import so3
-__all__: list[str] = ['AbsoluteError', 'AccelerometerFit', 'AccelerometerOptions', 'Alignment', 'AllanFit', 'AllanOptions', 'AllanTerm', 'Association', 'Camera', 'CameraCalibration', 'CameraModel', 'CameraRun', 'CarMotion', 'CircleMotion', 'ClockCalibration', 'ClockCalibrationResult', 'ClockChain', 'ClockLine', 'ClockModel', 'Consistency', 'CounterUnwrapper', 'DataError', 'DiscreteImuNoise', 'DistortionModel', 'ESTIMATE_CHANNEL', 'EllipsoidAdvice', 'EllipsoidCollector', 'EllipsoidFit', 'EllipsoidOptions', 'ErrorStateFilter', 'ErrorStateOptions', 'ErrorStateRun', 'ErrorStatistics', 'Estimate', 'EstimateStatus', 'EstimateValid', 'FUSION_CHANNEL', 'FeaturesArrays', 'FeaturesMeasurement', 'FigureEightMotion', 'FusionOutcome', 'FusionPreset', 'FusionPresetSensors', 'FusionResult', 'GPS_CHANNEL', 'GpsArrays', 'GpsCalibration', 'GpsClock', 'GpsFixType', 'GpsMeasurement', 'GpsModel', 'GyroscopeFit', 'GyroscopeOptions', 'HandHeldMotion', 'IMAGE_CHANNEL', 'IMU_CHANNEL', 'ImageMeasurement', 'ImuAllan', 'ImuArrays', 'ImuCalibration', 'ImuIntegration', 'ImuMeasurement', 'ImuModel', 'ImuNoise', 'ImuNoiseFit', 'ImuSampleModel', 'ImuSampling', 'InertialTriadModel', 'LcmLogReader', 'LocalFrame', 'LookAtMotion', 'MAGNETOMETER_CHANNEL', 'MadgwickFilter', 'MadgwickOptions', 'MadgwickResult', 'MagnetometerAlignment', 'MagnetometerAlignmentOptions', 'MagnetometerArrays', 'MagnetometerCalibration', 'MagnetometerMeasurement', 'MagnetometerModel', 'MeasurementSource', 'Motion', 'MotionArrays', 'MountedMotion', 'NO_TIME', 'NmeaFixes', 'ODOMETRY_CHANNEL', 'OdometryArrays', 'OdometryMeasurement', 'OrientationError', 'PedestrianMotion', 'Pose3', 'PredictOutcome', 'Quality', 'REFERENCE_CHANNEL', 'Random', 'Recording', 'ReferenceArrays', 'ReferenceMeasurement', 'RelativeError', 'RestFirstMotion', 'RestMotion', 'RestNoise', 'Rig', 'SOURCE_STATUS_CHANNEL', 'STATISTICS_CHANNEL', 'Scenario', 'ScenarioStreams', 'Scene', 'SceneRenderer', 'SimulatedRun', 'Simulation', 'StillSegment', 'Stillness', 'StillnessDetector', 'StillnessOptions', 'StreamClockModel', 'StreetModel', 'TRACKS_CHANNEL', 'TimeOffsetResult', 'Trajectory', 'TriadCalibration', 'TriadQuality', 'TruthArrays', 'Verdict', 'VisualOdometryModel', 'WaypointMotion', 'absolute_error', 'align_magnetometer', 'align_points', 'aligned', 'allan_fit', 'analyse_imu_noise', 'april_grid', 'associate', 'average_consistency', 'beta_from_gyro', 'box_room', 'calibrate_clock', 'checkerboard', 'chi_square_cdf', 'chi_square_quantile', 'discretise', 'error_statistics', 'estimate_time_offset', 'example_drive', 'find_stillness', 'fit_accelerometer', 'fit_accelerometer_poses', 'fit_ellipsoid', 'fit_gyroscope', 'fit_gyroscope_bias', 'format_seconds', 'gps_from_unix', 'imu_noise_from', 'leap_seconds_known_until', 'local_positions', 'message_fingerprints', 'message_type', 'normalised_error_squared', 'open_broad', 'open_csv', 'open_euroc', 'open_lcm_log', 'open_nmea', 'orientation_error', 'parse_nmea', 'parse_seconds', 'quantile', 'read_any_rig', 'read_points', 'read_rig', 'read_tracks', 'read_tum', 'relative_error', 'root_mean_square', 'sampled_path', 'scenario_names', 'simulate', 'simulate_camera', 'simulate_clock', 'simulate_gps_time', 'so3', 'street', 'unix_from_gps', 'update_rig', 'write_points', 'write_rig', 'write_tracks', 'write_tum']
+__all__: list[str] = ['AbsoluteError', 'AccelerometerFit', 'AccelerometerOptions', 'Alignment', 'AllanFit', 'AllanOptions', 'AllanTerm', 'Association', 'Camera', 'CameraCalibration', 'CameraModel', 'CameraRun', 'CarMotion', 'CircleMotion', 'ClockCalibration', 'ClockCalibrationResult', 'ClockChain', 'ClockLine', 'ClockModel', 'Consistency', 'CounterUnwrapper', 'DataError', 'DiscreteImuNoise', 'DistortionModel', 'ESTIMATE_CHANNEL', 'EllipsoidAdvice', 'EllipsoidCollector', 'EllipsoidFit', 'EllipsoidOptions', 'EqvioSource', 'ErrorStateFilter', 'ErrorStateOptions', 'ErrorStateRun', 'ErrorStatistics', 'Estimate', 'EstimateStatus', 'EstimateValid', 'FUSION_CHANNEL', 'FeaturesArrays', 'FeaturesMeasurement', 'FigureEightMotion', 'FusionOutcome', 'FusionPreset', 'FusionPresetSensors', 'FusionResult', 'FusionStartOptions', 'GPS_CHANNEL', 'GpsArrays', 'GpsCalibration', 'GpsClock', 'GpsFixType', 'GpsMeasurement', 'GpsModel', 'GyroscopeFit', 'GyroscopeOptions', 'HandHeldMotion', 'IMAGE_CHANNEL', 'IMU_CHANNEL', 'ImageMeasurement', 'ImuAllan', 'ImuArrays', 'ImuCalibration', 'ImuIntegration', 'ImuMeasurement', 'ImuModel', 'ImuNoise', 'ImuNoiseFit', 'ImuSampleModel', 'ImuSampling', 'InertialSlam', 'InertialTriadModel', 'InverseDepthPoint', 'KnownLandmark', 'LcmLogReader', 'LocalFrame', 'LookAtMotion', 'MAGNETOMETER_CHANNEL', 'MadgwickFilter', 'MadgwickOptions', 'MadgwickResult', 'MagnetometerAlignment', 'MagnetometerAlignmentOptions', 'MagnetometerArrays', 'MagnetometerCalibration', 'MagnetometerMeasurement', 'MagnetometerModel', 'MeasurementSource', 'MonoSlam', 'Motion', 'MotionArrays', 'MountedMotion', 'NO_TIME', 'NmeaFixes', 'ODOMETRY_CHANNEL', 'OdometryArrays', 'OdometryMeasurement', 'OrientationError', 'PedestrianMotion', 'Pose3', 'PredictOutcome', 'Quality', 'REFERENCE_CHANNEL', 'Random', 'Recording', 'ReferenceArrays', 'ReferenceMeasurement', 'RelativeError', 'RestFirstMotion', 'RestMotion', 'RestNoise', 'Rig', 'SOURCE_STATUS_CHANNEL', 'STATISTICS_CHANNEL', 'Scenario', 'ScenarioStreams', 'Scene', 'SceneRenderer', 'SimulatedRun', 'Simulation', 'SlamAssociationOptions', 'SlamConsistency', 'SlamCounts', 'SlamFeatureArrays', 'SlamFeatureState', 'SlamFile', 'SlamFrame', 'SlamLandmarkArrays', 'SlamMapArrays', 'SlamMapOptions', 'SlamMotion', 'SlamOptions', 'SlamPrecision', 'SlamRun', 'SlamSnapshot', 'SlamStartOptions', 'StandStillOptions', 'StillSegment', 'Stillness', 'StillnessDetector', 'StillnessOptions', 'StreamClockModel', 'StreetModel', 'TRACKS_CHANNEL', 'TimeOffsetResult', 'Trajectory', 'TriadCalibration', 'TriadQuality', 'TruthArrays', 'Verdict', 'VisualOdometryModel', 'WaypointMotion', 'absolute_error', 'align_magnetometer', 'align_points', 'aligned', 'allan_fit', 'analyse_imu_noise', 'april_grid', 'associate', 'average_consistency', 'beta_from_gyro', 'box_room', 'calibrate_clock', 'checkerboard', 'chi_square_cdf', 'chi_square_quantile', 'discretise', 'error_statistics', 'estimate_time_offset', 'example_drive', 'find_stillness', 'fit_accelerometer', 'fit_accelerometer_poses', 'fit_ellipsoid', 'fit_gyroscope', 'fit_gyroscope_bias', 'format_seconds', 'gps_from_unix', 'imu_noise_from', 'is_eqvio', 'leap_seconds_known_until', 'load_slam', 'local_positions', 'message_fingerprints', 'message_type', 'normalised_error_squared', 'open_broad', 'open_csv', 'open_eqvio', 'open_euroc', 'open_lcm_log', 'open_nmea', 'orientation_error', 'parse_nmea', 'parse_seconds', 'quantile', 'read_any_rig', 'read_points', 'read_rig', 'read_slam_options', 'read_tracks', 'read_tum', 'relative_error', 'root_mean_square', 'sampled_path', 'save_slam', 'scenario_names', 'simulate', 'simulate_camera', 'simulate_clock', 'simulate_gps_time', 'slam_options_text', 'so3', 'street', 'unix_from_gps', 'update_rig', 'write_ply', 'write_points', 'write_rig', 'write_slam_options', 'write_tracks', 'write_tum']
 class DataError(ValueError):
     """
     What is wrong in a file or message: where (file, line or byte), which field, which value.
@@ -516,6 +516,10 @@ class FeaturesMeasurement:
     """
     The features of one frame with their identities.
     """
+    def __init__(self, time_ns: typing.SupportsInt | typing.SupportsIndex, id: numpy.typing.NDArray[numpy.int64], pixel_px: numpy.typing.NDArray[numpy.float64], *, camera: typing.SupportsInt | typing.SupportsIndex = 0, sigma_px: typing.SupportsFloat | typing.SupportsIndex = ..., sequence: typing.SupportsInt | typing.SupportsIndex = -1) -> None:
+        """
+        id int64 (M,), pixel_px (M, 2); sigma_px: deviation of one coordinate, NaN when unknown.
+        """
     def __repr__(self) -> str:
         ...
     @property
@@ -1303,6 +1307,8 @@ class EstimateStatus(enum.IntFlag):
     AT_REST: typing.ClassVar[EstimateStatus]
     BAD_COVARIANCE: typing.ClassVar[EstimateStatus]
     BRIDGED: typing.ClassVar[EstimateStatus]
+    FEATURES_REJECTED: typing.ClassVar[EstimateStatus]
+    FEW_FEATURES: typing.ClassVar[EstimateStatus]
     GAP: typing.ClassVar[EstimateStatus]
     GPS_REJECTED: typing.ClassVar[EstimateStatus]
     INITIALISING: typing.ClassVar[EstimateStatus]
@@ -1314,6 +1320,7 @@ class EstimateStatus(enum.IntFlag):
     OUT_OF_RANGE: typing.ClassVar[EstimateStatus]
     RECOVERED: typing.ClassVar[EstimateStatus]
     REINITIALISED: typing.ClassVar[EstimateStatus]
+    SCALE_UNKNOWN: typing.ClassVar[EstimateStatus]
     TIME_NOT_INCREASING: typing.ClassVar[EstimateStatus]
     TOO_LATE: typing.ClassVar[EstimateStatus]
     @classmethod
@@ -3709,6 +3716,15 @@ class MeasurementSource:
         """
         Latitude, longitude [rad] and altitude [m] of the world's origin of a reference that is given in degrees (ASPN-23); None before its first position, and for other recordings.
         """
+class EqvioSource(MeasurementSource):
+    """
+    Tracks and IMU of a file of GTSAM's EqVIO example.
+    """
+    @property
+    def rig(self) -> Rig:
+        """
+        Has the camera that the pixels are of.
+        """
 class LcmLogReader:
     """
     Iterates over the events of an LCM log: (event number, log time [us since 1970], channel, data). Damage is skipped to the next event and reported by damage().
@@ -4221,6 +4237,1634 @@ class SceneRenderer:
         """
         uint8 (height, width) or (height, width, 3). Several poses: their mean, as motion blur.
         """
+class SlamMotion(enum.IntEnum):
+    """
+    What the filter knows of the motion.
+    """
+    CONSTANT_VELOCITY: typing.ClassVar[SlamMotion]
+    INERTIAL: typing.ClassVar[SlamMotion]
+    @classmethod
+    def __new__(cls, value):
+        ...
+    def __format__(self, format_spec):
+        ...
+class SlamConsistency(enum.IntEnum):
+    """
+    What keeps the filter from learning what it cannot know (place, heading) out of its linearisation errors.
+    """
+    FIRST_ESTIMATE: typing.ClassVar[SlamConsistency]
+    INVARIANT: typing.ClassVar[SlamConsistency]
+    PLAIN: typing.ClassVar[SlamConsistency]
+    @classmethod
+    def __new__(cls, value):
+        ...
+    def __format__(self, format_spec):
+        ...
+class SlamPrecision(enum.IntEnum):
+    """
+    Numbers of the covariance.
+    """
+    DOUBLE: typing.ClassVar[SlamPrecision]
+    FLOAT: typing.ClassVar[SlamPrecision]
+    @classmethod
+    def __new__(cls, value):
+        ...
+    def __format__(self, format_spec):
+        ...
+class SlamMapOptions:
+    """
+    Which features the map has; every field is a keyword of the constructor.
+    """
+    def __init__(self, **kwargs) -> None:
+        """
+        TypeError for an unknown field, ValueError for a value out of range.
+        """
+    def check(self) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    @property
+    def border_px(self) -> float:
+        """
+        Predicted nearer to the border: not expected to be seen [px].
+        """
+    @border_px.setter
+    def border_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def delete_after_tries(self) -> int:
+        """
+        Frames in which a feature was expected, before it is judged.
+        """
+    @delete_after_tries.setter
+    def delete_after_tries(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def delete_below_ratio(self) -> float:
+        """
+        Measured in less than this share of them: deleted.
+        """
+    @delete_below_ratio.setter
+    def delete_below_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def depth_from_neighbours(self) -> bool:
+        """
+        rho_0 of a new feature is the median of those that are known; its deviation grows with it.
+        """
+    @depth_from_neighbours.setter
+    def depth_from_neighbours(self, arg0: bool) -> None:
+        ...
+    @property
+    def grid_columns(self) -> int:
+        """
+        The picture's cells, over which new features are spread.
+        """
+    @grid_columns.setter
+    def grid_columns(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def grid_rows(self) -> int:
+        """
+        The same.
+        """
+    @grid_rows.setter
+    def grid_rows(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def inverse_depth(self) -> float:
+        """
+        Of a new feature (rho_0) [1/m].
+        """
+    @inverse_depth.setter
+    def inverse_depth(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_added(self) -> int:
+        """
+        In one frame; the first one fills up to min_visible.
+        """
+    @max_added.setter
+    def max_added(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_features(self) -> int:
+        """
+        In the map; bounds memory and time.
+        """
+    @max_features.setter
+    def max_features(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_linearity_index(self) -> float:
+        """
+        Below it a feature becomes XYZ; 0: never.
+        """
+    @max_linearity_index.setter
+    def max_linearity_index(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_measured(self) -> int:
+        """
+        In one frame: the most informative ones of those in view.
+        """
+    @max_measured.setter
+    def max_measured(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_separation_px(self) -> float:
+        """
+        Of a new feature from those in the map [px].
+        """
+    @min_separation_px.setter
+    def min_separation_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_visible(self) -> int:
+        """
+        Fewer measured: features are added.
+        """
+    @min_visible.setter
+    def min_visible(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_inverse_depth(self) -> float:
+        """
+        Its deviation (sigma_rho); 0 must lie well within 2 sigma [1/m].
+        """
+    @sigma_inverse_depth.setter
+    def sigma_inverse_depth(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class SlamAssociationOptions:
+    """
+    Which measurements are believed; every field is a keyword of the constructor.
+    """
+    def __init__(self, **kwargs) -> None:
+        """
+        TypeError for an unknown field, ValueError for a value out of range.
+        """
+    def check(self) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    def gate(self, motion: SlamMotion) -> float:
+        """
+        gate_probability, or its default for that motion model.
+        """
+    @property
+    def gate_probability(self) -> float:
+        """
+        Of a right measurement to pass (chi-square of 2); 0: what gate() says.
+        """
+    @gate_probability.setter
+    def gate_probability(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_hypotheses(self) -> int:
+        ...
+    @max_hypotheses.setter
+    def max_hypotheses(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def ransac(self) -> bool:
+        """
+        Hypotheses from one measurement each; without it the gate alone.
+        """
+    @ransac.setter
+    def ransac(self, arg0: bool) -> None:
+        ...
+    @property
+    def ransac_probability(self) -> float:
+        """
+        Of having tried one right measurement at least.
+        """
+    @ransac_probability.setter
+    def ransac_probability(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def seed(self) -> int:
+        """
+        Of the draws.
+        """
+    @seed.setter
+    def seed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class StandStillOptions:
+    """
+    When an IMU is at rest; every field is a keyword of the constructor.
+    """
+    def __init__(self, **kwargs) -> None:
+        """
+        TypeError for an unknown field, ValueError for a value out of range.
+        """
+    def check(self) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    @property
+    def force_sigma_floor(self) -> float:
+        """
+        Of one sample: quantisation, a desk [m/s^2].
+        """
+    @force_sigma_floor.setter
+    def force_sigma_floor(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_angular_velocity(self) -> float:
+        """
+        Mean rate less the bias [rad/s].
+        """
+    @max_angular_velocity.setter
+    def max_angular_velocity(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_force_change(self) -> float:
+        """
+        Of the mean force since this rest began [m/s^2].
+        """
+    @max_force_change.setter
+    def max_force_change(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_force_error(self) -> float:
+        """
+        Length of the mean force less gravity [m/s^2].
+        """
+    @max_force_error.setter
+    def max_force_error(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_rate_change(self) -> float:
+        """
+        Of the mean rate since this rest began [rad/s].
+        """
+    @max_rate_change.setter
+    def max_rate_change(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_duration_s(self) -> float:
+        """
+        Calm for this long is rest; the window counts [s].
+        """
+    @min_duration_s.setter
+    def min_duration_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_speed(self) -> float:
+        """
+        A speed that is surely higher says: not at rest [m/s].
+        """
+    @min_speed.setter
+    def min_speed(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rate_sigma_floor(self) -> float:
+        """
+        The same [rad/s].
+        """
+    @rate_sigma_floor.setter
+    def rate_sigma_floor(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def threshold(self) -> float:
+        """
+        Of the test; 6 is white noise of the densities alone.
+        """
+    @threshold.setter
+    def threshold(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def window_s(self) -> float:
+        """
+        [s]
+        """
+    @window_s.setter
+    def window_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class FusionStartOptions:
+    """
+    Start of an inertial filter from its first second; every field is a keyword of the constructor.
+    """
+    def __init__(self, **kwargs) -> None:
+        """
+        TypeError for an unknown field, ValueError for a value out of range.
+        """
+    def check(self) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    @property
+    def duration_s(self) -> float:
+        """
+        So much of the data is looked at [s].
+        """
+    @duration_s.setter
+    def duration_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def heading(self) -> float | None:
+        """
+        Of the body, from east to north [rad]; None: not known.
+        """
+    @heading.setter
+    def heading(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def heading_sigma(self) -> float:
+        """
+        Of the one that is given [rad].
+        """
+    @heading_sigma.setter
+    def heading_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def magnetic_declination(self) -> float:
+        """
+        East of north positive [rad].
+        """
+    @magnetic_declination.setter
+    def magnetic_declination(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def magnetic_heading_sigma(self) -> float:
+        """
+        Iron nearby, declination [rad].
+        """
+    @magnetic_heading_sigma.setter
+    def magnetic_heading_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_gap_s(self) -> float:
+        """
+        A longer step begins anew [s].
+        """
+    @max_gap_s.setter
+    def max_gap_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def moving_acceleration_sigma(self) -> float:
+        """
+        Of the mean over duration_s, when not at rest [m/s^2].
+        """
+    @moving_acceleration_sigma.setter
+    def moving_acceleration_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def moving_velocity_sigma(self) -> float:
+        """
+        [m/s]
+        """
+    @moving_velocity_sigma.setter
+    def moving_velocity_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_sigma(self) -> float:
+        """
+        The start is the origin [m].
+        """
+    @position_sigma.setter
+    def position_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def still_bias_sigma_floor(self) -> float:
+        """
+        Of the gyroscope's bias from a rest: earth rate, swaying [rad/s].
+        """
+    @still_bias_sigma_floor.setter
+    def still_bias_sigma_floor(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def still_velocity_sigma(self) -> float:
+        """
+        [m/s]
+        """
+    @still_velocity_sigma.setter
+    def still_velocity_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def tilt_sigma_floor(self) -> float:
+        """
+        [rad]
+        """
+    @tilt_sigma_floor.setter
+    def tilt_sigma_floor(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class SlamStartOptions:
+    """
+    Start of InertialSlam in motion, from a window of IMU samples and tracks; every field is a keyword of the constructor.
+    """
+    def __init__(self, **kwargs) -> None:
+        """
+        TypeError for an unknown field, ValueError for a value out of range.
+        """
+    def check(self) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    @property
+    def gyroscope_bias_sigma(self) -> float:
+        """
+        Wide prior [rad/s].
+        """
+    @gyroscope_bias_sigma.setter
+    def gyroscope_bias_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_condition(self) -> float:
+        """
+        Of the normal equations.
+        """
+    @max_condition.setter
+    def max_condition(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_duration_s(self) -> float:
+        """
+        Older ones are forgotten [s].
+        """
+    @max_duration_s.setter
+    def max_duration_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_features(self) -> int:
+        """
+        Those with the longest tracks.
+        """
+    @max_features.setter
+    def max_features(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_frames(self) -> int:
+        """
+        Of more, so many spread evenly are looked at.
+        """
+    @max_frames.setter
+    def max_frames(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_gap_s(self) -> float:
+        """
+        Between IMU samples; a longer one begins anew [s].
+        """
+    @max_gap_s.setter
+    def max_gap_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_scale_sigma(self) -> float:
+        """
+        Relative deviation of the scale.
+        """
+    @max_scale_sigma.setter
+    def max_scale_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_sigma_ratio(self) -> float:
+        """
+        Residuals may be so much larger than sigma_px says.
+        """
+    @max_sigma_ratio.setter
+    def max_sigma_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_tilt_sigma(self) -> float:
+        """
+        [rad]
+        """
+    @max_tilt_sigma.setter
+    def max_tilt_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_duration_s(self) -> float:
+        """
+        Of the frames that are looked at [s].
+        """
+    @min_duration_s.setter
+    def min_duration_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_features(self) -> int:
+        ...
+    @min_features.setter
+    def min_features(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_frames(self) -> int:
+        ...
+    @min_frames.setter
+    def min_frames(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_inliers(self) -> float:
+        """
+        Share of observations that must fit.
+        """
+    @min_inliers.setter
+    def min_inliers(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_observations(self) -> int:
+        """
+        Of a feature.
+        """
+    @min_observations.setter
+    def min_observations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_parallax(self) -> float:
+        """
+        Median over the features of the largest, in deviations of an observation.
+        """
+    @min_parallax.setter
+    def min_parallax(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sampling(self) -> ImuSampling:
+        """
+        ImuSampling: what an IMU sample says.
+        """
+    @sampling.setter
+    def sampling(self, arg0: ImuSampling) -> None:
+        ...
+    @property
+    def sigma_px(self) -> float:
+        """
+        Not used by InertialSlam, which has its own [px].
+        """
+    @sigma_px.setter
+    def sigma_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def velocity_floor(self) -> float:
+        """
+        A deviation of the velocity below max_scale_sigma times this is good enough [m/s].
+        """
+    @velocity_floor.setter
+    def velocity_floor(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class KnownLandmark:
+    """
+    A point whose place in world is known: it gives the scale and ties the world.
+    """
+    def __init__(self, id: typing.SupportsInt | typing.SupportsIndex, position: numpy.typing.ArrayLike, sigma: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> None:
+        ...
+    @property
+    def id(self) -> int:
+        ...
+    @id.setter
+    def id(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) in world [m]
+        """
+    @position.setter
+    def position(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def sigma(self) -> float:
+        """
+        Of each coordinate [m].
+        """
+    @sigma.setter
+    def sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class SlamOptions:
+    """
+    Options of MonoSlam and InertialSlam; every field is a keyword of the constructor: SlamOptions(camera=rig.cameras[0], sigma_px=0.5). Structs inside can be changed in place: options.map.max_features = 60.
+    """
+    consistency: SlamConsistency
+    motion: SlamMotion
+    precision: SlamPrecision
+    def __copy__(self) -> SlamOptions:
+        ...
+    def __deepcopy__(self, memo: dict) -> SlamOptions:
+        ...
+    def __init__(self, **kwargs) -> None:
+        """
+        TypeError for an unknown field; ValueError for a value out of range, once a camera is given.
+        """
+    def check(self) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    @property
+    def acceleration_density(self) -> float:
+        """
+        Q, camera alone [m/s^2/sqrt(Hz)].
+        """
+    @acceleration_density.setter
+    def acceleration_density(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def angular_acceleration_density(self) -> float:
+        """
+        Q, camera alone [rad/s^2/sqrt(Hz)].
+        """
+    @angular_acceleration_density.setter
+    def angular_acceleration_density(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def angular_velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Start: in body (3,) (X_cam_angular_velocity) [rad/s].
+        """
+    @angular_velocity.setter
+    def angular_velocity(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def association(self) -> SlamAssociationOptions:
+        """
+        SlamAssociationOptions
+        """
+    @association.setter
+    def association(self, arg0: SlamAssociationOptions) -> None:
+        ...
+    @property
+    def camera(self) -> CameraCalibration:
+        """
+        CameraCalibration: K with distortion, pose in body, clock. Without an IMU body is what moves smoothly; T_body_camera may be the identity.
+        """
+    @camera.setter
+    def camera(self, arg0: CameraCalibration) -> None:
+        ...
+    @property
+    def camera_index(self) -> int:
+        """
+        Which frames are ours.
+        """
+    @camera_index.setter
+    def camera_index(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def estimate_extrinsics(self) -> bool:
+        """
+        T_body_camera is part of the state.
+        """
+    @estimate_extrinsics.setter
+    def estimate_extrinsics(self, arg0: bool) -> None:
+        ...
+    @property
+    def estimate_time_offset(self) -> bool:
+        """
+        So is camera.time_offset_s.
+        """
+    @estimate_time_offset.setter
+    def estimate_time_offset(self, arg0: bool) -> None:
+        ...
+    @property
+    def gap_acceleration_sigma(self) -> float:
+        """
+        What the body may do in a gap [m/s^2].
+        """
+    @gap_acceleration_sigma.setter
+    def gap_acceleration_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gap_angular_velocity_sigma(self) -> float:
+        """
+        The same [rad/s].
+        """
+    @gap_angular_velocity_sigma.setter
+    def gap_angular_velocity_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gravity(self) -> float:
+        """
+        [m/s^2]
+        """
+    @gravity.setter
+    def gravity(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def imu_noise(self) -> ImuNoise:
+        """
+        Q, with an IMU; biases begin with its deviations.
+        """
+    @imu_noise.setter
+    def imu_noise(self, arg0: ImuNoise) -> None:
+        ...
+    @property
+    def imu_sampling(self) -> ImuSampling:
+        """
+        ImuSampling: what a sample of the IMU says.
+        """
+    @imu_sampling.setter
+    def imu_sampling(self, arg0: ImuSampling) -> None:
+        ...
+    @property
+    def landmarks(self) -> list[KnownLandmark]:
+        """
+        Copies of the known landmarks: assign a list to change them.
+        """
+    @landmarks.setter
+    def landmarks(self, arg1: collections.abc.Sequence[KnownLandmark]) -> None:
+        ...
+    @property
+    def lost_after_s(self) -> float:
+        """
+        Without a frame of enough features: estimates say so (FEW_FEATURES) [s].
+        """
+    @lost_after_s.setter
+    def lost_after_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def map(self) -> SlamMapOptions:
+        """
+        SlamMapOptions
+        """
+    @map.setter
+    def map(self, arg0: SlamMapOptions) -> None:
+        ...
+    @property
+    def max_angular_velocity(self) -> float:
+        """
+        A sample with more is skipped [rad/s].
+        """
+    @max_angular_velocity.setter
+    def max_angular_velocity(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_gap_s(self) -> float:
+        """
+        Camera alone: after a longer pause between frames the motion is unknown [s].
+        """
+    @max_gap_s.setter
+    def max_gap_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_imu_bridge_s(self) -> float:
+        """
+        Beyond it a new start [s].
+        """
+    @max_imu_bridge_s.setter
+    def max_imu_bridge_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_imu_step_s(self) -> float:
+        """
+        A longer step is a gap: bridged with more noise [s].
+        """
+    @max_imu_step_s.setter
+    def max_imu_step_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_iterations(self) -> int:
+        """
+        Of an update that is far from linear; 1: plain EKF.
+        """
+    @max_iterations.setter
+    def max_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_specific_force(self) -> float:
+        """
+        A sample with more is skipped [m/s^2].
+        """
+    @max_specific_force.setter
+    def max_specific_force(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def moving_start(self) -> SlamStartOptions:
+        """
+        With an IMU: SlamStartOptions, start from motion.
+        """
+    @moving_start.setter
+    def moving_start(self, arg0: SlamStartOptions) -> None:
+        ...
+    @property
+    def moving_start_factor(self) -> float:
+        """
+        By which the deviations of a start from motion are multiplied: what it rests on is used again.
+        """
+    @moving_start_factor.setter
+    def moving_start_factor(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def override_sigma(self) -> bool:
+        """
+        sigma_px also in place of what frames say.
+        """
+    @override_sigma.setter
+    def override_sigma(self, arg0: bool) -> None:
+        ...
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Start: of body in world (3,) (X_cam) [m].
+        """
+    @position.setter
+    def position(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def q_world_body_wxyz(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        Start (4,) (X_cam_rotation). None, the default: the camera looks along x of a world with z up.
+        """
+    @q_world_body_wxyz.setter
+    def q_world_body_wxyz(self, arg1: numpy.typing.ArrayLike | None) -> None:
+        ...
+    @property
+    def recover_after(self) -> int:
+        """
+        Frames in a row of which most is not believed: the motion is taken for unknown (RECOVERED).
+        """
+    @recover_after.setter
+    def recover_after(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_angular_velocity(self) -> float:
+        """
+        Of the start, root of P_angular [rad/s].
+        """
+    @sigma_angular_velocity.setter
+    def sigma_angular_velocity(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_extrinsic_position(self) -> float:
+        """
+        [m]
+        """
+    @sigma_extrinsic_position.setter
+    def sigma_extrinsic_position(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_extrinsic_rotation(self) -> float:
+        """
+        [rad]
+        """
+    @sigma_extrinsic_rotation.setter
+    def sigma_extrinsic_rotation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_orientation(self) -> float:
+        """
+        Of the start [rad].
+        """
+    @sigma_orientation.setter
+    def sigma_orientation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_position(self) -> float:
+        """
+        Of the start [m]; 0: world is where the camera began.
+        """
+    @sigma_position.setter
+    def sigma_position(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_px(self) -> float:
+        """
+        R: deviation of one coordinate, of frames that do not say [px].
+        """
+    @sigma_px.setter
+    def sigma_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_time_offset(self) -> float:
+        """
+        [s]
+        """
+    @sigma_time_offset.setter
+    def sigma_time_offset(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_velocity(self) -> float:
+        """
+        Of the start, root of P_velocity [m/s].
+        """
+    @sigma_velocity.setter
+    def sigma_velocity(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def stand_still(self) -> StandStillOptions:
+        """
+        With an IMU: StandStillOptions, when the body rests.
+        """
+    @stand_still.setter
+    def stand_still(self, arg0: StandStillOptions) -> None:
+        ...
+    @property
+    def start(self) -> FusionStartOptions:
+        """
+        With an IMU: FusionStartOptions, start from rest.
+        """
+    @start.setter
+    def start(self, arg0: FusionStartOptions) -> None:
+        ...
+    @property
+    def still_picture_px(self) -> float:
+        """
+        The picture is, as a whole, that near to where it was: it stands still … [px].
+        """
+    @still_picture_px.setter
+    def still_picture_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def still_picture_s(self) -> float:
+        """
+        … when it has been for so long [s].
+        """
+    @still_picture_s.setter
+    def still_picture_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Start: in world (3,) (X_cam_velocity) [m/s].
+        """
+    @velocity.setter
+    def velocity(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def vibration_part(self) -> float:
+        """
+        So much of the variance by which readings differ from sample to sample counts as white noise of the IMU.
+        """
+    @vibration_part.setter
+    def vibration_part(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def zero_rate_sigma_floor(self) -> float:
+        """
+        What a body at rest may turn, earth rate included [rad/s].
+        """
+    @zero_rate_sigma_floor.setter
+    def zero_rate_sigma_floor(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def zero_velocity(self) -> bool:
+        """
+        The velocity is zero while IMU and picture stand still.
+        """
+    @zero_velocity.setter
+    def zero_velocity(self, arg0: bool) -> None:
+        ...
+    @property
+    def zero_velocity_sigma(self) -> float:
+        """
+        [m/s]
+        """
+    @zero_velocity_sigma.setter
+    def zero_velocity_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class InverseDepthPoint:
+    """
+    A point by the ray on which it was first seen: anchor + ray / inverse_depth. Its errors are six numbers: anchor, two of the ray along ray_basis, inverse depth.
+    """
+    def __init__(self, anchor: numpy.typing.ArrayLike, ray: numpy.typing.ArrayLike, inverse_depth: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        anchor (3,) in world [m], ray (3,) in world, of any length, inverse_depth [1/m] of the distance.
+        """
+    def boxplus(self, error: numpy.typing.ArrayLike) -> InverseDepthPoint:
+        """
+        The point with the error (6,) applied.
+        """
+    def linearity_index(self, sigma_inverse_depth: typing.SupportsFloat | typing.SupportsIndex, camera: numpy.typing.ArrayLike) -> float:
+        """
+        How far the point is from having a Gaussian error in XYZ, seen from camera (3,) [m]; infinity for an inverse depth that is not positive.
+        """
+    def ray_basis(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 2), derivative of the ray by its two errors
+        """
+    def xyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) in world [m]; not finite when inverse_depth is 0.
+        """
+    def xyz_jacobian(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 6), derivative of xyz() by the errors
+        """
+    @property
+    def anchor(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) in world [m]
+        """
+    @anchor.setter
+    def anchor(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def azimuth(self) -> float:
+        """
+        [rad], of a world with y down, as in the source
+        """
+    @property
+    def elevation(self) -> float:
+        """
+        [rad]
+        """
+    @property
+    def frame_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (4,): its third axis in world is the ray, the errors of the ray are along the first two.
+        """
+    @frame_wxyz.setter
+    def frame_wxyz(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def inverse_depth(self) -> float:
+        """
+        [1/m], of the distance
+        """
+    @inverse_depth.setter
+    def inverse_depth(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def ray(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) unit vector in world
+        """
+class SlamFeatureState(enum.IntEnum):
+    """
+    What became of a feature in a frame.
+    """
+    MEASURED: typing.ClassVar[SlamFeatureState]
+    NEW: typing.ClassVar[SlamFeatureState]
+    PREDICTED: typing.ClassVar[SlamFeatureState]
+    REJECTED: typing.ClassVar[SlamFeatureState]
+    RESCUED: typing.ClassVar[SlamFeatureState]
+    @classmethod
+    def __new__(cls, value):
+        ...
+    def __format__(self, format_spec):
+        ...
+class SlamFeatureArrays:
+    """
+    Features of a frame, a row each.
+    """
+    @property
+    def converted(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        (M,) bool: is an XYZ point
+        """
+    @property
+    def estimated_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, 2) after it
+        """
+    @property
+    def id(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (M,) int64
+        """
+    @property
+    def innovation_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, 2, 2) of measured less predicted [px^2]
+        """
+    @property
+    def inverse_depth(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M,) [1/m]; of an XYZ point: of its distance
+        """
+    @property
+    def pixel_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, 2) as measured; NaN when it was not
+        """
+    @property
+    def predicted_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, 2) before the update
+        """
+    @property
+    def sigma_inverse_depth(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M,) its deviation; NaN for an XYZ point
+        """
+    @property
+    def state(self) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        (M,) uint8, SlamFeatureState
+        """
+class SlamMapArrays:
+    """
+    Features of the map, a row each. What a point does not have is NaN.
+    """
+    def __len__(self) -> int:
+        ...
+    @property
+    def anchor(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K, 3) in world [m]: where the camera was when it saw the point first
+        """
+    @property
+    def converted(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        (K,) bool: is an XYZ point; otherwise inverse depth
+        """
+    @property
+    def frame_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K, 4): the third axis is the ray from the anchor
+        """
+    @property
+    def id(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (K,) int64
+        """
+    @property
+    def inverse_depth(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K,) [1/m] along the ray
+        """
+    @property
+    def inverse_depth_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K, 6, 6): anchor, two of the ray, inverse depth
+        """
+    @property
+    def landmark(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        (K,) bool: was known beforehand
+        """
+    @property
+    def last_measured_ns(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (K,) int64; the smallest int64 (NO_TIME): never
+        """
+    @property
+    def measured(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (K,) frames in which it was used
+        """
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K, 3) in world [m]; NaN where the inverse depth is not positive
+        """
+    @property
+    def position_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K, 3, 3) [m^2]
+        """
+class SlamLandmarkArrays:
+    """
+    Features of a SlamSnapshot, a row each.
+    """
+    @property
+    def anchor(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K, 3) in world [m], unless converted
+        """
+    @property
+    def converted(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        (K,) bool: three errors, of position; otherwise six
+        """
+    @property
+    def frame_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K, 4): the third axis is the ray
+        """
+    @property
+    def id(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (K,) int64
+        """
+    @property
+    def inverse_depth(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K,) [1/m]
+        """
+    @property
+    def known(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        (K,) bool: its place was given
+        """
+    @property
+    def last_measured_ns(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (K,) int64; the smallest int64 (NO_TIME): never
+        """
+    @property
+    def measured(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (K,) frames in which it was used
+        """
+    @property
+    def offset(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (K,) int64: row of the covariance where its errors begin
+        """
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K, 3) in world [m], when converted
+        """
+class SlamCounts:
+    """
+    Numbers of features in one frame.
+    """
+    @property
+    def added(self) -> int:
+        """
+        to the map
+        """
+    @property
+    def converted(self) -> int:
+        """
+        from inverse depth to XYZ
+        """
+    @property
+    def deleted(self) -> int:
+        """
+        from the map
+        """
+    @property
+    def in_frame(self) -> int:
+        """
+        features that the frame has
+        """
+    @property
+    def map(self) -> int:
+        """
+        features afterwards
+        """
+    @property
+    def measured(self) -> int:
+        """
+        used, rescued ones included
+        """
+    @property
+    def rejected(self) -> int:
+        """
+        not believed
+        """
+    @property
+    def rescued(self) -> int:
+        """
+        used, after the others had moved the camera to where it agrees
+        """
+    @property
+    def visible(self) -> int:
+        """
+        of the map, expected in view
+        """
+class SlamFrame:
+    """
+    What SLAM says about one frame.
+    """
+    @property
+    def camera(self) -> int:
+        ...
+    @property
+    def camera_position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) of camera in world [m]
+        """
+    @property
+    def counts(self) -> SlamCounts:
+        ...
+    @property
+    def estimate(self) -> Estimate:
+        """
+        after the update; pose of body
+        """
+    @property
+    def features(self) -> SlamFeatureArrays:
+        ...
+    @property
+    def nis(self) -> float:
+        """
+        of all that was used
+        """
+    @property
+    def nis_dim(self) -> int:
+        """
+        numbers in it
+        """
+    @property
+    def q_world_camera_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def reprojection_after_px(self) -> float:
+        """
+        the same after the update
+        """
+    @property
+    def reprojection_before_px(self) -> float:
+        """
+        root of the mean square of |measured - predicted|, of those used; NaN without any
+        """
+    @property
+    def sequence(self) -> int:
+        ...
+    @property
+    def time_ns(self) -> int:
+        ...
+    @property
+    def time_spent_s(self) -> float:
+        """
+        by the filter
+        """
+class SlamSnapshot:
+    """
+    All that a filter knows; restore() goes on from there.
+    """
+    @property
+    def T_body_camera(self) -> Pose3:
+        ...
+    @property
+    def accelerometer_bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def angular_velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def covariance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n, n) of the errors: theta [rad, body axes], position, velocity, angular velocity or the biases of gyroscope and accelerometer; then, where estimated, rotation and place of the camera in body, its clock; then the features at their offsets.
+        """
+    @property
+    def gyroscope_bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def landmarks(self) -> SlamLandmarkArrays:
+        ...
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def q_world_body_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def time_ns(self) -> int | None:
+        ...
+    @property
+    def time_offset_s(self) -> float:
+        ...
+    @property
+    def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+class SlamRun:
+    """
+    What a whole recording gives: a row for each frame that was used.
+    """
+    def __len__(self) -> int:
+        ...
+    @property
+    def accelerometer_bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [m/s^2]; NaN without an IMU
+        """
+    @property
+    def angular_velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) in body [rad/s]
+        """
+    @property
+    def camera_position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) of camera in world [m]
+        """
+    @property
+    def counts(self) -> dict:
+        """
+        {field of SlamCounts: (N,) int64}
+        """
+    @property
+    def covariance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, d, d) of the error (theta [rad, body axes], p, v, bg, ba), d = 9 without an IMU, 15 with one
+        """
+    @property
+    def features(self) -> SlamFeatureArrays:
+        """
+        SlamFeatureArrays of all frames, when asked for
+        """
+    @property
+    def first(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (N + 1,): features of frame i are rows first[i]:first[i + 1]
+        """
+    @property
+    def gyroscope_bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [rad/s]; NaN without an IMU
+        """
+    @property
+    def map(self) -> SlamMapArrays:
+        """
+        SlamMapArrays, at the end
+        """
+    @property
+    def nis(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N,) of all that was used
+        """
+    @property
+    def nis_dim(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        (N,) numbers in it
+        """
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) of body in world [m]
+        """
+    @property
+    def q_world_body_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 4)
+        """
+    @property
+    def q_world_camera_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 4)
+        """
+    @property
+    def reprojection_after_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N,)
+        """
+    @property
+    def reprojection_before_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N,); NaN where nothing was used
+        """
+    @property
+    def sequence(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (N,) int64: row of the frame in what was given
+        """
+    @property
+    def snapshot(self) -> SlamSnapshot | None:
+        """
+        SlamSnapshot at the end, to go on from; None before the start.
+        """
+    @property
+    def status(self) -> numpy.typing.NDArray[numpy.uint32]:
+        """
+        (N,) uint32, EstimateStatus
+        """
+    @property
+    def stopped(self) -> bool:
+        """
+        progress() asked for it
+        """
+    @property
+    def time_ns(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (N,) int64
+        """
+    @property
+    def time_spent_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N,) by the filter
+        """
+    @property
+    def totals(self) -> dict[str, int]:
+        """
+        counts() of the estimator at the end: what was used and skipped, and why
+        """
+    @property
+    def valid(self) -> numpy.typing.NDArray[numpy.uint32]:
+        """
+        (N,) uint32, EstimateValid
+        """
+    @property
+    def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) in world [m/s]
+        """
+class MonoSlam:
+    """
+    SLAM with one camera alone: tracks of features in, pose of the camera and map out, from the first frame on. Not observable: the unit of lengths, unless landmarks are known; place and heading of the world.
+    """
+    def __init__(self, options: SlamOptions) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    def counts(self) -> dict[str, int]:
+        """
+        What was used and what was skipped, and why: {name: number}.
+        """
+    def estimate(self) -> Estimate:
+        ...
+    def frame(self) -> SlamFrame:
+        """
+        SlamFrame: the last one that was used, a copy.
+        """
+    def map(self) -> SlamMapArrays:
+        """
+        SlamMapArrays
+        """
+    @typing.overload
+    def process(self, measurement: ImuMeasurement | MagnetometerMeasurement | ImageMeasurement | GpsMeasurement | ReferenceMeasurement | OdometryMeasurement | FeaturesMeasurement) -> bool:
+        """
+        The next measurement in time order; says whether estimate() is new.
+        """
+    @typing.overload
+    def process(self, time_ns: typing.SupportsInt | typing.SupportsIndex, id: numpy.typing.NDArray[numpy.int64], pixel_px: numpy.typing.NDArray[numpy.float64], sigma_px: typing.SupportsFloat | typing.SupportsIndex = ...) -> bool:
+        """
+        One frame: id int64 (M,), pixel_px (M, 2), deviation of one coordinate (NaN: that of the options).
+        """
+    def reset(self) -> None:
+        """
+        Forgets the past, not the options or the counts.
+        """
+    def restore(self, snapshot: SlamSnapshot) -> None:
+        """
+        Goes on from there: the next frame may come at any later time, or on another clock. ValueError when it does not fit the options.
+        """
+    def run(self, time_ns: numpy.typing.NDArray[numpy.int64], first: numpy.typing.NDArray[numpy.int64], id: numpy.typing.NDArray[numpy.int64], pixel_px: numpy.typing.NDArray[numpy.float64], *, camera: numpy.typing.ArrayLike | None = None, sigma_px: numpy.typing.ArrayLike | None = None, progress: collections.abc.Callable | None = None, with_covariance: bool = True, with_features: bool = False) -> SlamRun:
+        """
+        A whole recording in one call, without the GIL and without copies of the input; the same numbers as step by step, and the next call goes on from here.
+        
+        Frame i at time_ns[i] has the features first[i]:first[i + 1] of id (M,) and pixel_px (M, 2): the fields of Recording.features. sigma_px and camera: one, or one for each frame; by default those of the options. With an IMU: imu_time_ns int64 (S,), gyro (S, 3) [rad/s], force (S, 3) [m/s^2], at rest +9.81 upwards. progress(frames done, frames in all) is called a few times in a second; when it returns False the run ends, with what there is. KeyboardInterrupt leaves the estimator where it was then.
+        """
+    def snapshot(self) -> SlamSnapshot:
+        ...
+    @property
+    def options(self) -> SlamOptions:
+        """
+        A copy.
+        """
+    @property
+    def running(self) -> bool:
+        ...
+class InertialSlam:
+    """
+    SLAM with one camera and an IMU: metres, and a world with z up. It starts from rest or in motion; the first estimate comes late, for all frames. Not observable: place and heading of the world.
+    """
+    def __init__(self, options: SlamOptions) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    def counts(self) -> dict[str, int]:
+        """
+        What was used and what was skipped, and why: {name: number}.
+        """
+    def estimate(self) -> Estimate:
+        ...
+    def frames(self) -> list[SlamFrame]:
+        """
+        [SlamFrame]: those that the last process() has completed, usually none or one; at the start all that waited.
+        """
+    def map(self) -> SlamMapArrays:
+        """
+        SlamMapArrays
+        """
+    @typing.overload
+    def process(self, measurement: ImuMeasurement | MagnetometerMeasurement | ImageMeasurement | GpsMeasurement | ReferenceMeasurement | OdometryMeasurement | FeaturesMeasurement) -> bool:
+        """
+        The next measurement in time order; says whether estimate() is new.
+        """
+    @typing.overload
+    def process(self, time_ns: typing.SupportsInt | typing.SupportsIndex, id: numpy.typing.NDArray[numpy.int64], pixel_px: numpy.typing.NDArray[numpy.float64], sigma_px: typing.SupportsFloat | typing.SupportsIndex = ...) -> bool:
+        """
+        One frame: id int64 (M,), pixel_px (M, 2), deviation of one coordinate (NaN: that of the options).
+        """
+    def reset(self) -> None:
+        """
+        Forgets the past, not the options or the counts.
+        """
+    def restore(self, snapshot: SlamSnapshot) -> None:
+        """
+        Goes on from there: the next frame may come at any later time, or on another clock. ValueError when it does not fit the options.
+        """
+    def run(self, time_ns: numpy.typing.NDArray[numpy.int64], first: numpy.typing.NDArray[numpy.int64], id: numpy.typing.NDArray[numpy.int64], pixel_px: numpy.typing.NDArray[numpy.float64], imu_time_ns: numpy.typing.NDArray[numpy.int64], gyro: numpy.typing.NDArray[numpy.float64], force: numpy.typing.NDArray[numpy.float64], *, camera: numpy.typing.ArrayLike | None = None, sigma_px: numpy.typing.ArrayLike | None = None, progress: collections.abc.Callable | None = None, with_covariance: bool = True, with_features: bool = False) -> SlamRun:
+        """
+        A whole recording in one call, without the GIL and without copies of the input; the same numbers as step by step, and the next call goes on from here.
+        
+        Frame i at time_ns[i] has the features first[i]:first[i + 1] of id (M,) and pixel_px (M, 2): the fields of Recording.features. sigma_px and camera: one, or one for each frame; by default those of the options. With an IMU: imu_time_ns int64 (S,), gyro (S, 3) [rad/s], force (S, 3) [m/s^2], at rest +9.81 upwards. progress(frames done, frames in all) is called a few times in a second; when it returns False the run ends, with what there is. KeyboardInterrupt leaves the estimator where it was then.
+        """
+    def snapshot(self) -> SlamSnapshot:
+        ...
+    @property
+    def options(self) -> SlamOptions:
+        """
+        A copy.
+        """
+    @property
+    def running(self) -> bool:
+        ...
+class SlamFile:
+    """
+    A saved map and state.
+    """
+    def why_not_restorable(self, options: SlamOptions) -> str:
+        """
+        What speaks against going on with these options; empty when nothing does.
+        """
+    @property
+    def camera(self) -> CameraCalibration:
+        """
+        that the map was made with
+        """
+    @property
+    def motion(self) -> SlamMotion:
+        ...
+    @property
+    def options(self) -> str:
+        """
+        text of slam.yaml: what the filter ran with
+        """
+    @property
+    def snapshot(self) -> SlamSnapshot:
+        ...
 class ImuSampleModel(enum.Enum):
     """
     Which true value a reading of a simulated IMU stands for.
@@ -5036,9 +6680,17 @@ def imu_noise_from(allan: ImuAllan, fallback: ImuNoise = ...) -> ImuNoiseFit:
     """
     What was not identified keeps the fallback's value, or the upper bound where that is lower.
     """
+def is_eqvio(path: os.PathLike | str | bytes) -> bool:
+    """
+    Whether the first line is the heading of such a file.
+    """
 def leap_seconds_known_until() -> str:
     """
     First day, as YYYY-MM-DD, of which the library's table of leap seconds does not know.
+    """
+def load_slam(path: os.PathLike | str | bytes) -> SlamFile:
+    """
+    DataError names the file when it is missing, cut, changed, or of another format.
     """
 def local_positions(latitude_longitude_altitude: numpy.typing.NDArray[numpy.float64], origin: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -5063,6 +6715,10 @@ def open_broad(path: os.PathLike | str | bytes, *, reference: bool = True) -> Me
 def open_csv(path: os.PathLike | str | bytes, *, time_unit: str = '', angular_velocity_unit: str = '', specific_force_unit: str = '', magnetic_field_unit: str = '', tesla_per_unit: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> MeasurementSource:
     """
     A CSV file whose first line names columns and units: time_ns or "t [s]", wx wy wz, ax ay az, mx my mz, qw qx qy qz, px py pz, latitude longitude altitude, odo_px odo_py odo_pz ... The units given here are for headings that have none.
+    """
+def open_eqvio(path: os.PathLike | str | bytes, *, camera: CameraCalibration | None = None, sigma_px: typing.SupportsFloat | typing.SupportsIndex = ...) -> EqvioSource:
+    """
+    Tracks and IMU of a file of GTSAM's EqVIO example, whose points are without pixels: as the camera would have seen them, by default a pinhole of the file's focal lengths.
     """
 def open_euroc(folder: os.PathLike | str | bytes, *, reference: bool = True, magnetometer: bool = True, gps: bool = True, odometry: bool = True) -> MeasurementSource:
     """
@@ -5104,6 +6760,10 @@ def read_rig(path: os.PathLike | str | bytes) -> Rig:
     """
     rig.yaml. DataError names file, line, key and value.
     """
+def read_slam_options(path: os.PathLike | str | bytes, options: SlamOptions | None = None) -> SlamOptions:
+    """
+    slam.yaml; what it does not say is as in options. DataError names file, line and key. Ranges are SlamOptions.check()'s, which needs the camera too.
+    """
 def read_tracks(path: os.PathLike | str | bytes) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64], dict[str, int]]:
     """
     A tracks file (rows `frame feature dimension value`): frame (M,), feature (M,), pixel_px (M, 2), and what was read and skipped. DataError names file, line and value.
@@ -5123,6 +6783,10 @@ def root_mean_square(values: numpy.typing.NDArray[numpy.float64]) -> float:
 def sampled_path(motion: Motion, spacing_m: typing.SupportsFloat | typing.SupportsIndex = 1.0, height_m: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> numpy.typing.NDArray[numpy.float64]:
     """
     Where a motion goes, for street(): (N, 3), all at one height.
+    """
+def save_slam(path: os.PathLike | str | bytes, snapshot: SlamSnapshot, options: SlamOptions) -> None:
+    """
+    Saves what a filter knows, to go on from with restore(); options: the filter's. All numbers come back bit for bit.
     """
 def scenario_names() -> dict[str, str]:
     """
@@ -5144,6 +6808,10 @@ def simulate_gps_time(duration_s: typing.SupportsFloat | typing.SupportsIndex, r
     """
     (is_pulse, host_times_ns, gps_times_ns) as GpsClock.update takes them, then the truth second by second: host times and GPS times, int64 (M,).
     """
+def slam_options_text(options: SlamOptions) -> str:
+    """
+    As write_slam_options() writes it.
+    """
 def street(path: numpy.typing.ArrayLike, random: Random, model: StreetModel | None = None) -> Scene:
     """
     Facades on both sides of a path (N, 3) on the ground [m], and the road.
@@ -5156,19 +6824,27 @@ def update_rig(path: os.PathLike | str | bytes, change: collections.abc.Callable
     """
     Reads rig.yaml (an empty rig when there is none), calls change(rig), which alters it, and writes it. What is not changed stays as it was to the last bit, but comments are lost. When anything raises, the file stays as it was.
     """
+def write_ply(path: os.PathLike | str | bytes, position: numpy.typing.NDArray[numpy.float64], id: numpy.typing.NDArray[numpy.int64], sigma: numpy.typing.NDArray[numpy.float64], *, comments: collections.abc.Sequence[str] = [], ascii: bool = False) -> int:
+    """
+    Points (N, 3) [m] with identities int64 (N,) of 32 bit and deviations (N,) [m] for viewers. Points that are not finite are left out; returns how many.
+    """
 def write_points(path: os.PathLike | str | bytes, points: numpy.typing.ArrayLike) -> None:
     ...
 def write_rig(path: os.PathLike | str | bytes, rig: Rig) -> None:
     """
     Writes rig.yaml; read_rig gives the same numbers back.
     """
+def write_slam_options(path: os.PathLike | str | bytes, options: SlamOptions) -> None:
+    """
+    Writes slam.yaml: every field but the camera; numbers read back as the same.
+    """
 def write_tracks(path: os.PathLike | str | bytes, frame: numpy.typing.NDArray[numpy.int64], feature: numpy.typing.NDArray[numpy.int64], pixel_px: numpy.typing.NDArray[numpy.float64]) -> None:
     """
     Writes a tracks file from arrays (M,), (M,), (M, 2); frames must ascend.
     """
-def write_tum(path: os.PathLike | str | bytes, trajectory: Trajectory) -> None:
+def write_tum(path: os.PathLike | str | bytes, trajectory: Trajectory, frame: str = 'body') -> None:
     """
-    Writes a trajectory in TUM's format.
+    Writes a trajectory in TUM's format; frame: whose poses they are, for the heading.
     """
 ESTIMATE_CHANNEL: str = 'LOC_ESTIMATE'
 FUSION_CHANNEL: str = 'LOC_FUSION'
