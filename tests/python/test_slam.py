@@ -403,7 +403,7 @@ def test_snapshot_and_reset():
     assert not slam.running
     assert len(slam.map()) == 0
     wrong = copy.deepcopy(options)
-    wrong.estimate_time_offset = True
+    wrong.estimate_extrinsics = True
     with pytest.raises(ValueError, match="snapshot"):
         libloc.MonoSlam(wrong).restore(kept)
 
