@@ -210,12 +210,9 @@ bool InertialSlam::process_imu(const ImuMeasurement& imu) {
     // The state is from another time; nobody knows how the body moved since.
     filter_.set_time(imu.time_ns);
     last_imu_ = imu;
-    Eigen::VectorXd variance = Eigen::VectorXd::Zero(filter_.layout().dim);
     const double gap = options().max_imu_bridge_s;
-    variance.segment<3>(kTheta).setConstant(square(options().gap_angular_velocity_sigma * gap));
-    variance.segment<3>(kVelocity).setConstant(square(options().gap_acceleration_sigma * gap));
-    variance.segment<3>(kPosition).setConstant(square(options().gap_acceleration_sigma * gap * gap));
-    filter_.widen(variance);
+    const double acceleration = options().gap_acceleration_sigma;
+    widen(options().gap_angular_velocity_sigma * gap, acceleration * gap * gap, acceleration * gap);
     status_ |= kGap;
     last_good_frame_ns_ = imu.time_ns;
     restored_ = false;
@@ -407,13 +404,19 @@ void InertialSlam::step_to(TimeNs time_ns, const ImuMeasurement& to) {
   last_imu_ = end;
 }
 
+// By deviations of each component: what happened meanwhile is not known.
+void InertialSlam::widen(double angle, double position, double velocity) {
+  Eigen::VectorXd variance = Eigen::VectorXd::Zero(filter_.layout().dim);
+  variance.segment<3>(kTheta).setConstant(square(angle));
+  variance.segment<3>(kPosition).setConstant(square(position));
+  variance.segment<3>(kVelocity).setConstant(square(velocity));
+  filter_.widen(variance);
+}
+
 void InertialSlam::bridge(const ImuMeasurement& imu) {
   const double gap = to_seconds(imu.time_ns - filter_.time_ns());
-  Eigen::VectorXd variance = Eigen::VectorXd::Zero(filter_.layout().dim);
-  variance.segment<3>(kTheta).setConstant(square(options().gap_angular_velocity_sigma * gap));
-  variance.segment<3>(kVelocity).setConstant(square(options().gap_acceleration_sigma * gap));
-  variance.segment<3>(kPosition).setConstant(square(0.5 * options().gap_acceleration_sigma * gap * gap));
-  filter_.widen(variance);
+  const double acceleration = options().gap_acceleration_sigma;
+  widen(options().gap_angular_velocity_sigma * gap, 0.5 * acceleration * gap * gap, acceleration * gap);
   ++counts_["imu.gaps.bridged"];
   status_ |= kGap | kBridged;
 }
@@ -550,11 +553,7 @@ void InertialSlam::recover(const SlamFrame& frame) {
   rejected_in_a_row_ = contradicted ? rejected_in_a_row_ + 1 : 0;
   if (rejected_in_a_row_ < options().recover_after) return;
   rejected_in_a_row_ = 0;
-  Eigen::VectorXd variance = Eigen::VectorXd::Zero(filter_.layout().dim);
-  variance.segment<3>(kTheta).setConstant(square(kRecoverAngle));
-  variance.segment<3>(kPosition).setConstant(square(kRecoverPosition));
-  variance.segment<3>(kVelocity).setConstant(square(kRecoverVelocity));
-  filter_.widen(variance);
+  widen(kRecoverAngle, kRecoverPosition, kRecoverVelocity);
   ++counts_["recovered"];
   next_status_ |= kRecovered;
 }

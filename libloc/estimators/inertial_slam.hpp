@@ -81,6 +81,7 @@ class InertialSlam {
   void recover(const SlamFrame& frame);
   void run(const ImuMeasurement& imu);
   void step_to(TimeNs time_ns, const ImuMeasurement& to);
+  void widen(double angle, double position, double velocity);
   void bridge(const ImuMeasurement& imu);
   void start_anew();
   InertialStepNoise noise_of(double dt_s) const;
