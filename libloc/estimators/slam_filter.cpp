@@ -224,34 +224,6 @@ bool SlamFilter::zero_velocity(double sigma_velocity, const Eigen::Vector3d& rat
   return true;
 }
 
-bool SlamFilter::fuse_position(const Eigen::Vector3d& position, const Eigen::Matrix3d& position_cov,
-                               const Eigen::Vector3d& lever) {
-  bring_covariance_up();
-  BlockMeasurement& m = measurements_.front();
-  const Eigen::Matrix3d to_world = state_.q_world_body.toRotationMatrix();
-  m.rows = 3;
-  m.block = -1;
-  m.head.setZero();
-  m.head.block<3, 3>(0, kPosition).setIdentity();
-  m.head.block<3, 3>(0, kTheta) = -to_world * so3::hat(lever);
-  m.noise_cov.topLeftCorner<3, 3>() = position_cov;
-  m.residual.head<3>() = position - state_.position - to_world * lever;
-  constexpr double kGate = 16.27;  // chi-square of 3, 0.999
-  which_.assign(1, 0);
-  const Eigen::Matrix3d s = covariance_.innovation_cov(m).topLeftCorner<3, 3>();
-  const Eigen::Vector3d r = m.residual.head<3>();
-  if (!(r.dot(s.ldlt().solve(r)) < kGate)) return false;
-  covariance_.innovate(measurements_, which_);
-  accepted_.assign({0, 1, 2});
-  accepted_residual_.assign(r.data(), r.data() + 3);
-  if (!covariance_.update(accepted_, accepted_residual_, dx_, nis_)) {
-    ++failed_updates_;
-    return false;
-  }
-  apply_update();
-  return true;
-}
-
 Estimate SlamFilter::estimate() const {
   Estimate out;
   out.time_ns = time_ns_;

@@ -4,7 +4,8 @@
 //
 // One frame:
 //   1. the covariance is brought to the frame's time                                 P = F P F^T + Q
-//   2. features are predicted, and matched with the frame's by identity
+//   2. features are predicted, and matched with the frame's by identity; after a while without features, when
+//      predictions say nothing, the pose is looked for in the map first (absolute_pose.hpp)
 //   3. of those matched the most informative ones (largest det S) are taken, up to max_measured
 //   4. 1-point RANSAC finds which of them agree; those update the state together
 //   5. the others are predicted anew: who is within the gate now was right (rescued) and updates it, too
@@ -51,7 +52,6 @@ struct SlamLandmark {
   // Of the frame at hand.
   bool visible = false;
   int observation = -1;  ///< index in the frame; -1: no such identity
-  int slot = -1;         ///< index among the measurements; -1: not used
   SlamFeatureState state = SlamFeatureState::kPredicted;
   Eigen::Vector2d predicted_px = Eigen::Vector2d::Constant(kUnknown);
   Eigen::Matrix2d innovation_cov = Eigen::Matrix2d::Constant(kUnknown);
@@ -97,9 +97,6 @@ class SlamFilter {
   /// The body does not move: v = 0, and with an IMU the mean rate is the gyroscope's bias.
   /// @param rate as measured, bias not removed [rad/s] @returns false when the filter knows better (gate).
   bool zero_velocity(double sigma_velocity, const Eigen::Vector3d& rate, double sigma_rate);
-  /// Place of a point of the body. @param lever in body [m] @returns false when outside the gate.
-  bool fuse_position(const Eigen::Vector3d& position, const Eigen::Matrix3d& position_cov,
-                     const Eigen::Vector3d& lever);
 
   TimeNs time_ns() const { return time_ns_; }
   const SlamState& state() const { return state_; }
@@ -130,6 +127,8 @@ class SlamFilter {
   bool linearise(SlamLandmark& landmark, const Eigen::Vector2d& pixel_px, BlockMeasurement& out) const;
   bool approach(const FeaturesMeasurement& frame, SlamState& near);
   const std::vector<char>& agreeing(double sigma);
+  void innovate();
+  void accept(const std::vector<char>& chosen);
   void update_agreeing(const FeaturesMeasurement& frame);
   void iterate(const FeaturesMeasurement& frame);
   Eigen::Vector2d moved_by(const BlockMeasurement& measurement) const;

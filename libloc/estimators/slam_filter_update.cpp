@@ -67,7 +67,7 @@ void SlamFilter::match(const FeaturesMeasurement& frame) {
     taken_[static_cast<std::size_t>(by_id_[i + 1].second)] = 1;
   }
   for (SlamLandmark& landmark : landmarks_) {
-    landmark.observation = landmark.slot = -1;
+    landmark.observation = -1;
     landmark.state = SlamFeatureState::kPredicted;
     landmark.innovation_cov.setConstant(kUnknown);
     const auto predicted = predict(state_, camera_, landmark.point);
@@ -197,6 +197,7 @@ void SlamFilter::select_measured(const FeaturesMeasurement& frame) {
     landmark.innovation_cov = covariance_.innovation_cov(measurement).topLeftCorner<2, 2>();
     candidates_.push_back(static_cast<int>(i));
   }
+  if (approached_) first_ = state_;  // the first estimate that means anything
   state_ = prior;
   const auto most = static_cast<std::size_t>(options_.map.max_measured);
   if (candidates_.size() > most) {
@@ -264,8 +265,8 @@ const std::vector<char>& SlamFilter::agreeing(double sigma) {
   return agrees_;
 }
 
-void SlamFilter::update_agreeing(const FeaturesMeasurement& frame) {
-  if (which_.empty()) return;
+// P H^T, S and the residuals of which_.
+void SlamFilter::innovate() {
   covariance_.innovate(measurements_, which_);
   residual_.clear();
   for (const int i : which_) {
@@ -273,18 +274,30 @@ void SlamFilter::update_agreeing(const FeaturesMeasurement& frame) {
     residual_.push_back(measurement.residual[0]);
     residual_.push_back(measurement.residual[1]);
   }
-  const std::vector<char>& agrees = agreeing(sigma_px(frame));
+}
+
+// The rows of those of which_ that are chosen, for the update.
+void SlamFilter::accept(const std::vector<char>& chosen) {
   accepted_.clear();
   accepted_residual_.clear();
   for (std::size_t k = 0; k < which_.size(); ++k) {
-    SlamLandmark& landmark = landmarks_[static_cast<std::size_t>(which_[k])];
-    landmark.state = agrees[k] != 0 ? SlamFeatureState::kMeasured : SlamFeatureState::kRejected;
-    if (agrees[k] == 0) continue;
+    if (chosen[k] == 0) continue;
     for (std::size_t row = 2 * k; row < 2 * k + 2; ++row) {
       accepted_.push_back(static_cast<int>(row));
       accepted_residual_.push_back(residual_[row]);
     }
   }
+}
+
+void SlamFilter::update_agreeing(const FeaturesMeasurement& frame) {
+  if (which_.empty()) return;
+  innovate();
+  const std::vector<char>& agrees = agreeing(sigma_px(frame));
+  for (std::size_t k = 0; k < which_.size(); ++k) {
+    SlamLandmark& landmark = landmarks_[static_cast<std::size_t>(which_[k])];
+    landmark.state = agrees[k] != 0 ? SlamFeatureState::kMeasured : SlamFeatureState::kRejected;
+  }
+  accept(agrees);
   if (accepted_.empty()) return;
   iterate(frame);
   if (!covariance_.update(accepted_, accepted_residual_, dx_, nis_)) {
@@ -378,23 +391,8 @@ void SlamFilter::rescue(const FeaturesMeasurement& frame) {
     which_.push_back(i);
   }
   if (which_.empty()) return;
-  covariance_.innovate(measurements_, which_);
-  residual_.clear();
-  for (const int i : which_) {
-    const BlockMeasurement& measurement = measurements_[static_cast<std::size_t>(i)];
-    residual_.push_back(measurement.residual[0]);
-    residual_.push_back(measurement.residual[1]);
-  }
-  const std::vector<char>& compatible = ransac_.compatible(covariance_, residual_);
-  accepted_.clear();
-  accepted_residual_.clear();
-  for (std::size_t k = 0; k < which_.size(); ++k) {
-    if (compatible[k] == 0) continue;
-    for (std::size_t row = 2 * k; row < 2 * k + 2; ++row) {
-      accepted_.push_back(static_cast<int>(row));
-      accepted_residual_.push_back(residual_[row]);
-    }
-  }
+  innovate();
+  accept(ransac_.compatible(covariance_, residual_));
   if (accepted_.empty()) return;
   iterate(frame);
   if (!covariance_.update(accepted_, accepted_residual_, dx_, nis_)) {
