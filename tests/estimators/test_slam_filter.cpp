@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
 #include "libloc/core/check.hpp"
@@ -181,6 +182,68 @@ TEST(MonoSlam, SurvivesWhatTrackersDo) {
   MonoSlam slam(ride_options(SlamMotion::kConstantVelocity));
   const Outcome out = ride(slam, bad, 20);
   EXPECT_LT(out.ate(AlignmentMode::kSim3), std::max(2 * good, 0.06));
+}
+
+// Two seconds in the dark leave the camera alone metres off: it finds itself in its map with the first frame after
+// them.
+TEST(MonoSlam, FindsItselfAgainAfterTheDark) {
+  SlamOptions options = ride_options(SlamMotion::kConstantVelocity);
+  SlamRideOptions dark;
+  dark.blind_from_s = 10;
+  dark.blind_to_s = 12;
+  SlamRide world(dark);
+  const Pose3 start = world.pose(0);
+  options.q_world_body = start.rotation;
+  options.position = start.translation;
+  const Camera camera(options.camera);
+  for (std::size_t i = 0; i < world.points().size() && options.landmarks.size() < 8; ++i) {
+    const auto pixel = camera.project((start * options.camera.T_body_camera).inverse() * world.points()[i]);
+    if (!pixel || !camera.in_image(*pixel, 60)) continue;
+    options.landmarks.push_back({static_cast<std::int64_t>(i), world.points()[i], 1e-3});
+  }
+  MonoSlam slam(options);
+  const Outcome out = ride(slam, dark, 14);
+  double in_the_dark = 0;
+  double after = 0;
+  for (std::size_t i = 0; i < out.truth.times_ns.size(); ++i) {
+    const double t = SlamRide::time_s(out.truth.times_ns[i]);
+    const double error = (out.truth.poses[i].translation - out.estimate.poses[i].translation).norm();
+    if (t > 11 && t < 11.99) in_the_dark = std::max(in_the_dark, error);
+    if (t >= 12) after = std::max(after, error);
+  }
+  EXPECT_GT(in_the_dark, 1) << "else the test would show nothing";
+  EXPECT_LT(after, 0.15);
+}
+
+// Streams come in the order of their stamps: a camera whose clock is ahead comes when the IMU is past it.
+TEST(InertialSlam, ACameraWhoseClockIsAheadIsNotLost) {
+  constexpr double kOffset = -0.02;
+  SlamOptions options = ride_options(SlamMotion::kInertial);
+  options.camera.time_offset_s = kOffset;
+  InertialSlam slam(options);
+  SlamRide world({});
+  std::vector<Measurement> recording;
+  world.run(10, [&](Measurement measurement) {
+    if (std::holds_alternative<FeaturesMeasurement>(measurement))
+      stamp_of(measurement).time_ns -= from_seconds(kOffset);
+    recording.push_back(measurement);
+  });
+  std::stable_sort(recording.begin(), recording.end(), [](const Measurement& a, const Measurement& b) {
+    return stamp_of(a).time_ns < stamp_of(b).time_ns;
+  });
+  for (const Measurement& measurement : recording) slam.process(measurement);
+  EXPECT_EQ(count_of(slam.counts(), "features.skipped.late"), 0);
+  EXPECT_GT(count_of(slam.counts(), "features.used"), 190);
+  const double t = SlamRide::time_s(slam.estimate().time_ns);
+  EXPECT_LT((slam.estimate().position - world.pose(t).translation).norm(), 0.05);
+}
+
+TEST(InertialSlam, BeginsWithTheHeadingThatIsGiven) {
+  SlamOptions options = ride_options(SlamMotion::kInertial);
+  options.q_world_body = Eigen::Quaterniond(Eigen::AngleAxisd(1, Eigen::Vector3d::UnitZ()));
+  InertialSlam slam(options);
+  ride(slam, {}, 1.4);
+  EXPECT_NEAR(so3::heading(slam.estimate().q_world_body), 1, 0.01);
 }
 
 // Identities of different points that change places are outliers like any other.
