@@ -114,7 +114,7 @@ slam_state_t to_message(const SlamSnapshot& snapshot, const SlamOptions& options
     out.hits.push_back(landmark.hits);
     out.measured.push_back(landmark.measured);
     out.last_measured_ns.push_back(landmark.last_measured_ns);
-    out.last_visible_ns.push_back(landmark.last_visible_ns);
+    out.last_visible_ns.push_back(landmark.last_measured_ns);
     out.converted.push_back(landmark.point.converted ? 1 : 0);
     out.point.push_back(point_to(landmark.point));
     out.first_converted.push_back(landmark.first.converted ? 1 : 0);
@@ -157,7 +157,6 @@ SlamFile from_message(const slam_state_t& m) {
     landmark.hits = m.hits[i];
     landmark.measured = m.measured[i];
     landmark.last_measured_ns = m.last_measured_ns[i];
-    landmark.last_visible_ns = m.last_visible_ns[i];
     landmark.point = point_from(m.converted[i] != 0, m.point[i], "point");
     landmark.first = point_from(m.first_converted[i] != 0, m.first_point[i], "first_point");
     features_dim += landmark.point.dim();

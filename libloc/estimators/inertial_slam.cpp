@@ -9,23 +9,19 @@
 namespace loc {
 namespace {
 
-constexpr int kSetBackAfter = 20;                            // samples in a row on an earlier time line
-constexpr std::size_t kMostWaiting = 256;                    // frames without an IMU sample after them
-constexpr int kTryEvery = 5;                                 // frames from one try of a start in motion to the next
-constexpr double kVibrationTime = 0.1;                       // over which shaking is averaged [s]
-constexpr double kLongestHold = 0.5;                         // of samples for frames [s]
-constexpr double kFarthestAhead = 10;                        // of the IMU: a frame is on another clock [s]
-constexpr double kLeastDepthPart = 0.02;                     // deviation of a depth that a start found, at least
-constexpr double kStillAtStart = 2;                          // times as much may a body sway before the start
-constexpr double kPictureIsOld = 0.5;                        // says nothing of now [s]
-constexpr double kFarthestWay = 100;                         // deviation of a place after a gap [m]
-constexpr TimeNs kFarthestTime = 2'000'000'000'000'000'000;  // half of a time whose differences can be taken [ns]
-constexpr std::size_t kUsualFeatures = 1000;                 // of a frame; more take memory once
-constexpr double kAnyHeading = 1.8;                          // deviation of any angle in a turn [rad]
-constexpr double kRecoverAngle = 0.02;                       // what is unknown after a contradiction [rad]
-constexpr double kRecoverPosition = 0.1;                     // [m]
-constexpr double kRecoverVelocity = 0.5;                     // [m/s]
-constexpr int kFewestStill = 5;                              // features that tell whether the picture stands still
+constexpr int kSetBackAfter = 20;          // samples in a row on an earlier time line
+constexpr std::size_t kMostWaiting = 256;  // frames without an IMU sample after them
+constexpr int kTryEvery = 5;               // frames from one try of a start in motion to the next
+constexpr double kVibrationTime = 0.1;     // over which shaking is averaged [s]
+constexpr double kLongestHold = 0.5;       // of samples for frames [s]
+constexpr double kFarthestAhead = 10;      // of the IMU: a frame is on another clock [s]
+constexpr double kLeastDepthPart = 0.02;   // deviation of a depth that a start found, at least
+constexpr double kFarthestWay = 100;       // deviation of a place after a gap [m]
+constexpr double kAnyHeading = 1.8;        // deviation of any angle in a turn [rad]
+constexpr double kRecoverAngle = 0.02;     // what is unknown after a contradiction [rad]
+constexpr double kRecoverPosition = 0.1;   // [m]
+constexpr double kRecoverVelocity = 0.5;   // [m/s]
+constexpr int kFewestRejected = 5;         // that contradict a state
 
 double square(double x) {
   return x * x;
@@ -64,11 +60,9 @@ InertialSlam::InertialSlam(const SlamOptions& options)
     : filter_(options),
       start_(options.start, options.stand_still, options.imu_noise, options.gravity),
       moving_start_(moving_start_options(options), options.camera, options.imu_noise, options.gravity),
-      rest_(options.stand_still, options.imu_noise, options.gravity) {
+      rest_(options.stand_still, options.imu_noise, options.gravity),
+      picture_rest_(options.camera.intrinsics_px.tail<2>(), options.still_picture_px, options.still_picture_s) {
   require(options.motion == SlamMotion::kInertial, "motion: InertialSlam needs an IMU, MonoSlam does without");
-  picture_.reserve(kUsualFeatures);
-  picture_before_.reserve(kUsualFeatures);
-  for (std::vector<double>& moves : moves_) moves.reserve(kUsualFeatures);
 }
 
 void InertialSlam::skip(const char* count, std::uint32_t status) {
@@ -78,9 +72,8 @@ void InertialSlam::skip(const char* count, std::uint32_t status) {
 
 void InertialSlam::reset() {
   filter_.stop();
-  start_.reset();
-  moving_start_.reset();
   rest_.reset();
+  forget_early();
   while (!waiting_.empty()) waiting_.drop_front();
   while (!held_.empty()) held_.drop_front();
   leap_.reset();
@@ -88,15 +81,22 @@ void InertialSlam::reset() {
   frames_set_back_ = 0;
   vibration_ = Vibration{};
   status_ = next_status_ = 0;
-  early_.clear();
   frame_count_ = 0;
   carried_.reset();
   early_frames_ = rejected_in_a_row_ = 0;
-  forget_picture();
   last_ = Stamp{};
   last_good_frame_ns_ = last_frame_ns_ = rest_used_ns_ = kNoTime;
   restored_ = false;
   set_back_in_a_row_ = 0;
+}
+
+// What was gathered for a start, and what is known of rest.
+void InertialSlam::forget_early() {
+  start_.reset();
+  moving_start_.reset();
+  early_.clear();
+  picture_rest_.reset();
+  at_rest_ = false;
 }
 
 void InertialSlam::restore(const SlamSnapshot& snapshot) {
@@ -153,7 +153,7 @@ TimeNs InertialSlam::on_imu_clock(TimeNs camera_time_ns) const {
 }
 
 void InertialSlam::process_frame(const FeaturesMeasurement& frame) {
-  if (std::abs(frame.time_ns / 2) > kFarthestTime ||
+  if (!SlamFilter::is_usable(frame.time_ns) ||
       (newest_ns_ != kNoTime && to_seconds(frame.time_ns - newest_ns_) > kFarthestAhead)) {
     skip("features.skipped.out_of_range", kOutOfRange);
     return;
@@ -176,7 +176,7 @@ void InertialSlam::process_frame(const FeaturesMeasurement& frame) {
 }
 
 bool InertialSlam::usable(const ImuMeasurement& imu) {
-  if (std::abs(imu.time_ns / 2) > kFarthestTime) {
+  if (!SlamFilter::is_usable(imu.time_ns)) {
     skip("imu.skipped.out_of_range", kOutOfRange);
     return false;
   }
@@ -236,7 +236,9 @@ bool InertialSlam::look_for_start() {
   if (start_.push(last_imu_)) {
     // A gyroscope at rest reads its bias, whatever that is, and an accelerometer that shakes reads gravity on the
     // whole: whether it is rest, the picture tells, to about a pixel.
-    if (waiting_frames_stand_still(start_.samples().front().time_ns)) {
+    std::size_t first = 0;
+    while (first < waiting_.size() && on_imu_clock(waiting_[first].time_ns) < start_.samples().front().time_ns) ++first;
+    if (picture_rest_.stood_still(waiting_, first)) {
       const double pixel = options().still_picture_px / options().camera.intrinsics_px.head<2>().minCoeff();
       const FusionStartEstimate from = start_.estimate_still(pixel / options().start.duration_s);
       begin(from.time_ns, from.state, from.covariance, "starts.at_rest");
@@ -426,11 +428,8 @@ void InertialSlam::start_anew() {
   next_status_ |= kGap | kReinitialised;
   carried_ = Carried{filter_.time_ns(), filter_.state(), filter_.head_covariance()};
   filter_.stop();
-  start_.reset();
-  moving_start_.reset();
   rest_.reset();
-  early_.clear();
-  forget_picture();
+  forget_early();
 }
 
 void InertialSlam::run(const ImuMeasurement& imu) {
@@ -463,80 +462,14 @@ void InertialSlam::run(const ImuMeasurement& imu) {
     ++counts_["diverged"];
     next_status_ |= kReinitialised;
     filter_.stop();
-    start_.reset();
-    moving_start_.reset();
-    early_.clear();
-    forget_picture();
+    forget_early();
     return;
   }
   if (to_seconds(imu.time_ns - last_good_frame_ns_) > options().lost_after_s) status_ |= kFewFeatures;
 }
 
-void InertialSlam::forget_picture() {
-  picture_before_.clear();
-  picture_before_ns_ = picture_ns_ = kNoTime;
-  at_rest_ = false;
-}
-
-// How far the picture moved since picture_before_: the largest of the medians along u and v, away from its centre and
-// around it, so that the noise of single features does not count. NaN when too few are in both.
-double InertialSlam::moved_px(const FeaturesMeasurement& frame) {
-  picture_.assign(frame.features.begin(), frame.features.end());
-  std::sort(picture_.begin(), picture_.end(),
-            [](const FeatureObservation& a, const FeatureObservation& b) { return a.id < b.id; });
-  for (std::vector<double>& moves : moves_) moves.clear();
-  const Eigen::Vector2d centre = options().camera.intrinsics_px.tail<2>();
-  auto other = picture_before_.begin();
-  for (const FeatureObservation& feature : picture_) {
-    while (other != picture_before_.end() && other->id < feature.id) ++other;
-    if (other == picture_before_.end()) break;
-    if (other->id != feature.id || !feature.pixel_px.allFinite() || !other->pixel_px.allFinite()) continue;
-    const Eigen::Vector2d move = feature.pixel_px - other->pixel_px;
-    const Eigen::Vector2d out = (other->pixel_px - centre).normalized();
-    moves_[0].push_back(move.x());
-    moves_[1].push_back(move.y());
-    moves_[2].push_back(out.dot(move));
-    moves_[3].push_back(out.x() * move.y() - out.y() * move.x());
-  }
-  if (moves_[0].size() < static_cast<std::size_t>(kFewestStill)) return kUnknown;
-  double most = 0;
-  for (std::vector<double>& moves : moves_) {
-    const auto middle = moves.begin() + static_cast<std::ptrdiff_t>(moves.size() / 2);
-    std::nth_element(moves.begin(), middle, moves.end());
-    most = std::max(most, std::abs(*middle));
-  }
-  return most;
-}
-
-// The picture stands still as long as it is where it was a second ago and longer: what creeps moves from frame to frame
-// by less than can be seen, but not from second to second.
-void InertialSlam::see_picture(const FeaturesMeasurement& frame) {
-  picture_ns_ = filter_.time_ns();
-  if (moved_px(frame) < options().still_picture_px) return;
-  picture_before_.swap(picture_);
-  picture_before_ns_ = picture_ns_;
-}
-
-bool InertialSlam::picture_stands_still() const {
-  return picture_before_ns_ != kNoTime && to_seconds(picture_ns_ - picture_before_ns_) >= options().still_picture_s &&
-         to_seconds(last_.time_ns - picture_ns_) < kPictureIsOld;
-}
-
-// Of the frames since then: against the first of them, so that what creeps shows.
-bool InertialSlam::waiting_frames_stand_still(TimeNs since_ns) {
-  std::size_t first = 0;
-  while (first < waiting_.size() && on_imu_clock(waiting_[first].time_ns) < since_ns) ++first;
-  if (waiting_.size() < first + 3) return false;
-  moved_px(waiting_[first]);
-  picture_before_.swap(picture_);
-  for (std::size_t i = first + 1; i < waiting_.size(); ++i) {
-    if (!(moved_px(waiting_[i]) < kStillAtStart * options().still_picture_px)) return false;
-  }
-  return true;
-}
-
 void InertialSlam::take_frame(const FeaturesMeasurement& frame) {
-  see_picture(frame);
+  picture_rest_.see(frame, filter_.time_ns());
   const SlamFrame& done = filter_.update(frame, status_ | (at_rest_ ? kAtRest : 0U));
   ++frames_used_;
   if ((done.estimate.status & kFewFeatures) == 0) last_good_frame_ns_ = filter_.time_ns();
@@ -549,7 +482,7 @@ void InertialSlam::take_frame(const FeaturesMeasurement& frame) {
 
 // Most of what is seen contradicts the state for some frames: the state is wrong, and does not know it.
 void InertialSlam::recover(const SlamFrame& frame) {
-  const bool contradicted = frame.counts.rejected >= kFewestStill && frame.counts.rejected > frame.counts.measured;
+  const bool contradicted = frame.counts.rejected >= kFewestRejected && frame.counts.rejected > frame.counts.measured;
   rejected_in_a_row_ = contradicted ? rejected_in_a_row_ + 1 : 0;
   if (rejected_in_a_row_ < options().recover_after) return;
   rejected_in_a_row_ = 0;
@@ -560,7 +493,8 @@ void InertialSlam::recover(const SlamFrame& frame) {
 
 void InertialSlam::look_for_rest(const ImuMeasurement& imu) {
   const double bias_sigma = std::sqrt(std::max(0.0, filter_.covariance()(kGyroscopeBias, kGyroscopeBias)));
-  const bool still = rest_.update(imu, filter_.state().gyroscope_bias, bias_sigma) && picture_stands_still();
+  const bool still =
+      rest_.update(imu, filter_.state().gyroscope_bias, bias_sigma) && picture_rest_.stands_still(last_.time_ns);
   if (!still) {
     at_rest_ = false;
     return;
@@ -572,7 +506,7 @@ void InertialSlam::look_for_rest(const ImuMeasurement& imu) {
     const double sigma_rate = std::hypot(rest_.mean_rate_sigma(), options().zero_rate_sigma_floor);
     at_rest_ = filter_.zero_velocity(options().zero_velocity_sigma, rest_.mean_rate(), sigma_rate);
     ++counts_[at_rest_ ? "rest.used" : "rest.rejected"];
-    if (!at_rest_) forget_picture();  // The filter knows that it moves; let the picture prove the contrary.
+    if (!at_rest_) picture_rest_.reset();  // The filter knows that it moves; let the picture prove the contrary.
   }
   if (at_rest_) status_ |= kAtRest;
 }

@@ -13,7 +13,6 @@
 // Not observable: place and heading of the world. Without acceleration: the scale.
 #pragma once
 
-#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -22,6 +21,7 @@
 #include "libloc/core/fifo.hpp"
 #include "libloc/estimators/estimator.hpp"
 #include "libloc/estimators/fusion_start.hpp"
+#include "libloc/estimators/picture_rest.hpp"
 #include "libloc/estimators/slam_filter.hpp"
 #include "libloc/estimators/slam_options.hpp"
 #include "libloc/estimators/slam_start.hpp"
@@ -84,15 +84,11 @@ class InertialSlam {
   void widen(double angle, double position, double velocity);
   void bridge(const ImuMeasurement& imu);
   void start_anew();
+  void forget_early();
   InertialStepNoise noise_of(double dt_s) const;
   void see_vibration(const ImuMeasurement& imu);
   void take_frame(const FeaturesMeasurement& frame);
-  void forget_picture();
-  void see_picture(const FeaturesMeasurement& frame);
-  double moved_px(const FeaturesMeasurement& frame);
-  bool waiting_frames_stand_still(TimeNs since_ns);
   void look_for_rest(const ImuMeasurement& imu);
-  bool picture_stands_still() const;
   TimeNs on_imu_clock(TimeNs camera_time_ns) const;
   void skip(const char* count, std::uint32_t status);
 
@@ -100,6 +96,7 @@ class InertialSlam {
   FusionStart start_;
   SlamStart moving_start_;
   StandStillDetector rest_;
+  PictureRest picture_rest_;
   std::vector<SlamFrame> frames_;
   std::size_t frame_count_ = 0;
 
@@ -115,11 +112,6 @@ class InertialSlam {
   int frames_set_back_ = 0;             // in a row
   std::optional<Carried> carried_;
   Vibration vibration_;
-  std::vector<FeatureObservation> picture_;  // of the last frame, by identity: does it stand still?
-  std::vector<FeatureObservation> picture_before_;
-  std::array<std::vector<double>, 4> moves_;
-  TimeNs picture_before_ns_ = kNoTime;  // of picture_before_, from which the picture has not moved since
-  TimeNs picture_ns_ = kNoTime;         // of the last frame that was taken
   bool at_rest_ = false;
   int rejected_in_a_row_ = 0;
   TimeNs last_good_frame_ns_ = kNoTime;

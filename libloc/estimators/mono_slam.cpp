@@ -11,7 +11,6 @@ namespace {
 // Frames in a row on an earlier time line that mean: the clock was set back.
 constexpr int kSetBackAfter = 10;
 // What is unknown after longer is no less known: the numbers must stay such that one can calculate with them. [s]
-constexpr TimeNs kFarthestTime = 2'000'000'000'000'000'000;  // half of a time whose differences can be taken [ns]
 constexpr double kLongestPause = 30;
 
 }  // namespace
@@ -53,7 +52,7 @@ bool MonoSlam::process(const Measurement& measurement) {
 }
 
 bool MonoSlam::process_frame(const FeaturesMeasurement& frame) {
-  if (std::abs(frame.time_ns / 2) > kFarthestTime) {
+  if (!SlamFilter::is_usable(frame.time_ns)) {
     ++out_of_range_;
     next_status_ |= kOutOfRange;
     return false;

@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kFewest = 3;                    // features in a frame that hold a pose
 constexpr std::size_t kUsualFeatures = 1000;  // of a frame; more take memory once
+constexpr TimeNs kFarthestTime = 4'000'000'000'000'000'000;
 
 }  // namespace
 
@@ -44,6 +45,10 @@ SlamFilter::SlamFilter(const SlamOptions& options)
   frame_.features.reserve(2 * features);
   by_id_.reserve(kUsualFeatures);
   taken_.reserve(kUsualFeatures);
+}
+
+bool SlamFilter::is_usable(TimeNs time_ns) {
+  return time_ns >= -kFarthestTime && time_ns <= kFarthestTime;
 }
 
 void SlamFilter::start(TimeNs time_ns, const SlamState& state, const Eigen::MatrixXd& covariance) {

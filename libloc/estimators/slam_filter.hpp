@@ -47,8 +47,7 @@ struct SlamLandmark {
   std::int64_t measured = 0;
   TimeNs last_measured_ns = kNoTime;
   std::int64_t last_measured_frame = -1;  ///< counted by the filter, whatever clocks do
-  TimeNs last_visible_ns = kNoTime;
-  bool known = false;  ///< its place was given
+  bool known = false;                     ///< its place was given
   // Of the frame at hand.
   bool visible = false;
   int observation = -1;  ///< index in the frame; -1: no such identity
@@ -74,6 +73,8 @@ class SlamFilter {
   void start(TimeNs time_ns, const SlamState& state, const Eigen::MatrixXd& covariance);
   /// Camera alone: as the options say.
   void start(TimeNs time_ns);
+  /// Differences of such times can be taken: within 126 years of zero, and known.
+  static bool is_usable(TimeNs time_ns);
   bool started() const { return time_ns_ != kNoTime; }
   /// Forgets all but the options and the counts.
   void stop();

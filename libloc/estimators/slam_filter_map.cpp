@@ -124,7 +124,6 @@ bool SlamFilter::add_landmark(const FeatureObservation& observation, double inve
   landmark.first = landmark.point;
   landmark.offset = covariance_.append(birth->head_jacobian.leftCols(layout_.dim), birth->noise_cov);
   landmark.tries = landmark.hits = 1;
-  landmark.last_visible_ns = time_ns_;
   landmark.last_measured_ns = time_ns_;
   landmark.last_measured_frame = frames_;
   landmark.visible = true;

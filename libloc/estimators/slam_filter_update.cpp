@@ -73,7 +73,6 @@ void SlamFilter::match(const FeaturesMeasurement& frame) {
     const auto predicted = predict(state_, camera_, landmark.point);
     landmark.predicted_px = predicted ? *predicted : Eigen::Vector2d::Constant(kUnknown);
     landmark.visible = predicted && camera_.in_image(*predicted, options_.map.border_px);
-    if (landmark.visible) landmark.last_visible_ns = time_ns_;
     const auto found = std::lower_bound(by_id_.begin(), by_id_.end(), std::pair{landmark.id, -1});
     if (found == by_id_.end() || found->first != landmark.id) continue;
     const auto index = static_cast<std::size_t>(found->second);
@@ -433,7 +432,6 @@ void SlamFilter::judge(const FeaturesMeasurement& frame) {
     ++landmark.measured;
     landmark.last_measured_ns = time_ns_;
     landmark.last_measured_frame = frames_;
-    landmark.last_visible_ns = time_ns_;
     const Eigen::Vector2d& pixel = frame.features[static_cast<std::size_t>(landmark.observation)].pixel_px;
     before += (pixel - landmark.predicted_px).squaredNorm();
     if (const auto now = predict(state_, camera_, landmark.point)) after += (pixel - *now).squaredNorm();

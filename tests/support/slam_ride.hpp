@@ -25,6 +25,7 @@ struct SlamRideOptions {
   double drop_rate = 0;       ///< share of frames that do not come
   double blind_from_s = 1e9;  ///< no feature from here …
   double blind_to_s = 1e9;    ///< … to here
+  double glide = 0;       ///< along y at that speed [m/s], in place of the sines, after two seconds of speeding up
   bool imu_noise = true;
   Eigen::Vector3d gyroscope_bias{0.01, -0.02, 0.03};
   Eigen::Vector3d accelerometer_bias{0.05, -0.04, 0.06};
@@ -58,6 +59,11 @@ class SlamRide {
   /// True pose of body; at rest until rest_s, then sines.
   Pose3 pose(double time_s) const {
     const double t = std::max(0.0, time_s - options_.rest_s);
+    if (options_.glide != 0) {
+      const double u = std::min(t / 2, 1.0);
+      const double way = 2 * u * u * u * u * (2.5 - 3 * u + u * u) + std::max(0.0, t - 2);
+      return {Eigen::Quaterniond::Identity(), {0, options_.glide * way, 0}};
+    }
     const double s = t < 1 ? t * t * t * (10 - 15 * t + 6 * t * t) : 1;  // smooth beginning
     const Eigen::Vector3d p(1.2 * std::sin(0.9 * t), 1.0 * std::sin(1.3 * t), 0.5 * std::sin(1.7 * t));
     const Eigen::Vector3d r(0.3 * std::sin(1.1 * t), 0.25 * std::sin(0.8 * t), 0.8 * std::sin(0.5 * t));
