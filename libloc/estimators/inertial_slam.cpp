@@ -406,6 +406,19 @@ void InertialSlam::step_to(TimeNs time_ns, const ImuMeasurement& to) {
   last_imu_ = end;
 }
 
+void InertialSlam::predict_frame(TimeNs time_ns, SlamPrediction& out) const {
+  out.time_ns = time_ns;
+  out.valid = false;
+  out.features.clear();
+  if (!filter_.started() || restored_ || !SlamFilter::is_usable(time_ns)) return;
+  const double ahead = to_seconds(on_imu_clock(time_ns) - filter_.time_ns());
+  if (ahead < 0 || ahead > options().max_imu_bridge_s) return;
+  const SlamState& state = filter_.state();
+  const InertialStep step{last_imu_.angular_velocity - state.gyroscope_bias,
+                          last_imu_.specific_force - state.accelerometer_bias, ahead};
+  filter_.predict_frame(time_ns, step, noise_of(ahead), out);
+}
+
 // By deviations of each component: what happened meanwhile is not known.
 void InertialSlam::widen(double angle, double position, double velocity) {
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(filter_.layout().dim);

@@ -40,6 +40,11 @@ class InertialSlam {
   NamedCounts counts() const;
   void reset();
 
+  /// Where the features of the map are expected in a picture of that time (clock of the camera), before it is
+  /// processed: from the IMU samples so far; what is missing of them to that time the body is taken to go on. Not valid
+  /// before the start, for a time before the last sample's that was used, or more than max_imu_bridge_s after it.
+  void predict_frame(TimeNs time_ns, SlamPrediction& out) const;
+
   bool running() const { return filter_.started(); }
   /// Frames that the last process() has completed: usually none or one, at the start those that had waited. Their
   /// estimates are at the frames' own times.

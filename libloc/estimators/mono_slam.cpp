@@ -46,6 +46,18 @@ void MonoSlam::widen_after_gap(double pause_s) {
   filter_.widen(variance);
 }
 
+void MonoSlam::predict_frame(TimeNs time_ns, SlamPrediction& out) const {
+  const bool known = filter_.started() && !restored_ && SlamFilter::is_usable(time_ns) && time_ns > filter_.time_ns() &&
+                     to_seconds(time_ns - filter_.time_ns()) <= filter_.options().max_gap_s;
+  if (known) {
+    filter_.predict_frame(time_ns, out);
+    return;
+  }
+  out.time_ns = time_ns;
+  out.valid = false;
+  out.features.clear();
+}
+
 bool MonoSlam::process(const Measurement& measurement) {
   const auto* frame = std::get_if<FeaturesMeasurement>(&measurement);
   return frame != nullptr && frame->camera == filter_.options().camera_index && process_frame(*frame);

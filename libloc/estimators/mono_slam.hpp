@@ -28,6 +28,10 @@ class MonoSlam {
   NamedCounts counts() const;
   void reset();
 
+  /// Where the features of the map are expected in a picture of that time, before it is processed. Not valid before the
+  /// first frame, after a pause of more than max_gap_s, and for a time that is not after the last frame's.
+  void predict_frame(TimeNs time_ns, SlamPrediction& out) const;
+
   bool running() const { return filter_.started(); }
   /// Of the last frame that was used. The reference holds, what it says changes with the next frame.
   const SlamFrame& frame() const { return filter_.frame(); }

@@ -24,6 +24,7 @@ SlamFilter::SlamFilter(const SlamOptions& options)
       covariance_(options.precision == SlamPrecision::kFloat, layout_.dim,
                   layout_.dim + kInverseDepthDim * options.map.max_features, 2 * std::max(options.map.max_measured, 3)),
       transition_(layout_),
+      ahead_(layout_),
       ransac_(options.association, options.motion, options.map.max_measured),
       dx_(covariance_.capacity()),
       shear_(covariance_.capacity(), 3) {
@@ -193,6 +194,70 @@ const SlamFrame& SlamFilter::update(const FeaturesMeasurement& frame, std::uint3
   if (counts.rejected > counts.measured) frame_.estimate.status |= kFeaturesRejected;
   frame_.time_spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return frame_;
+}
+
+void SlamFilter::predict_frame(TimeNs time_ns, SlamPrediction& out) const {
+  SlamState ahead = state_;
+  ahead_ = transition_;
+  const double dt = to_seconds(time_ns - time_ns_);
+  if (dt > 0) ahead_.move(ahead, dt, options_.acceleration_density, options_.angular_acceleration_density);
+  predict_frame_at(ahead, time_ns, out);
+}
+
+void SlamFilter::predict_frame(TimeNs time_ns, const InertialStep& step, const InertialStepNoise& noise,
+                               SlamPrediction& out) const {
+  SlamState ahead = state_;
+  ahead_ = transition_;
+  if (step.dt_s > 0) ahead_.move(ahead, step, noise, {0, 0, -options_.gravity});
+  predict_frame_at(ahead, time_ns, out);
+}
+
+// With x' = F x + noise of Q: S = (H F) P (H F)^T + H_h Q H_h^T + R, so that P stays as it is.
+void SlamFilter::predict_frame_at(const SlamState& ahead, TimeNs time_ns, SlamPrediction& out) const {
+  out.time_ns = time_ns;
+  out.valid = true;
+  out.T_world_camera = ahead.T_world_camera();
+  out.features.resize(landmarks_.size());
+  const int dim = layout_.dim;
+  BlockMeasurement m;
+  m.rows = 2;
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    const SlamLandmark& landmark = landmarks_[i];
+    SlamFeaturePrediction& feature = out.features[i];
+    feature.id = landmark.id;
+    if (landmark.point.converted) {
+      feature.point = landmark.point.position;
+      feature.weight = 1;
+    } else {
+      const InverseDepthPoint& p = landmark.point.inverse_depth;
+      feature.weight = std::max(0.0, p.inverse_depth);
+      feature.point = feature.weight * p.anchor + p.ray();
+    }
+    const auto pixel = predict(ahead, camera_, landmark.point);
+    feature.visible = pixel && camera_.in_image(*pixel, options_.map.border_px);
+    if (!feature.visible) continue;
+    const auto jacobian = jacobian_of(ahead, layout_, camera_, landmark.point);
+    feature.visible = jacobian.has_value();
+    if (!feature.visible) continue;
+    feature.pixel_px = *pixel;
+    const auto head = jacobian->head.leftCols(dim);
+    m.noise_cov.topLeftCorner<2, 2>() = options_.sigma_px * options_.sigma_px * Eigen::Matrix2d::Identity();
+    if (options_.second_order_noise && !landmark.point.converted) {
+      m.noise_cov.topLeftCorner<2, 2>() += product_cov(landmark, jacobian->by_way, ahead_);
+    }
+    if (ahead_.empty()) {
+      m.head.topLeftCorner(2, dim) = head;
+    } else {
+      m.head.topLeftCorner(2, dim) = head.lazyProduct(ahead_.f());
+      Eigen::Matrix<double, 2, kMaxHeadDim> noise;
+      noise.leftCols(dim) = head.lazyProduct(ahead_.q());
+      m.noise_cov.topLeftCorner<2, 2>() += noise.leftCols(dim).lazyProduct(head.transpose());
+    }
+    m.block = landmark.offset;
+    m.block_dim = landmark.point.dim();
+    m.block_jacobian.topRows<2>() = jacobian->block;
+    feature.search_cov = covariance_.innovation_cov(m).topLeftCorner<2, 2>();
+  }
 }
 
 bool SlamFilter::zero_velocity(double sigma_velocity, const Eigen::Vector3d& rate, double sigma_rate) {

@@ -29,6 +29,7 @@
 #include "libloc/estimators/slam_frame.hpp"
 #include "libloc/estimators/slam_observation.hpp"
 #include "libloc/estimators/slam_options.hpp"
+#include "libloc/estimators/slam_prediction.hpp"
 #include "libloc/estimators/slam_ransac.hpp"
 #include "libloc/estimators/slam_state.hpp"
 #include "libloc/filter/map_covariance.hpp"
@@ -95,6 +96,13 @@ class SlamFilter {
   /// A frame at time_ns(). The result holds until the next call. @param status EstimateStatus to be said with it
   const SlamFrame& update(const FeaturesMeasurement& frame, std::uint32_t status = 0);
 
+  /// What a frame at that time would find, were the body to move on as the model says. The filter stays where it is.
+  /// @param time_ns not before time_ns()
+  void predict_frame(TimeNs time_ns, SlamPrediction& out) const;
+  /// The same with a step of the IMU.
+  void predict_frame(TimeNs time_ns, const InertialStep& step, const InertialStepNoise& noise,
+                     SlamPrediction& out) const;
+
   /// The body does not move: v = 0, and with an IMU the mean rate is the gyroscope's bias.
   /// @param rate as measured, bias not removed [rad/s] @returns false when the filter knows better (gate).
   bool zero_velocity(double sigma_velocity, const Eigen::Vector3d& rate, double sigma_rate);
@@ -122,10 +130,15 @@ class SlamFilter {
   void restore(const SlamSnapshot& snapshot);
 
  private:
+  void predict_frame_at(const SlamState& ahead, TimeNs time_ns, SlamPrediction& out) const;
   void bring_covariance_up();
   void match(const FeaturesMeasurement& frame);
   void select_measured(const FeaturesMeasurement& frame);
-  bool linearise(SlamLandmark& landmark, const Eigen::Vector2d& pixel_px, BlockMeasurement& out) const;
+  // @param sigma_px its noise is set anew; 0: it stays
+  bool linearise(const SlamLandmark& landmark, const Eigen::Vector2d& pixel_px, double sigma_px,
+                 BlockMeasurement& out) const;
+  Eigen::Matrix2d product_cov(const SlamLandmark& landmark, const Eigen::Matrix<double, 2, 3>& by_way,
+                              const SlamTransition& since) const;
   bool approach(const FeaturesMeasurement& frame, SlamState& near);
   const std::vector<char>& agreeing(double sigma);
   void innovate();
@@ -156,6 +169,7 @@ class SlamFilter {
   Camera camera_;
   MapCovariance covariance_;
   SlamTransition transition_;
+  mutable SlamTransition ahead_;  // of predict_frame
   OnePointRansac ransac_;
   TimeNs time_ns_ = kNoTime;
   SlamState state_;

@@ -81,7 +81,8 @@ void SlamFilter::match(const FeaturesMeasurement& frame) {
   }
 }
 
-bool SlamFilter::linearise(SlamLandmark& landmark, const Eigen::Vector2d& pixel_px, BlockMeasurement& out) const {
+bool SlamFilter::linearise(const SlamLandmark& landmark, const Eigen::Vector2d& pixel_px, double sigma_px,
+                           BlockMeasurement& out) const {
   const auto predicted = predict(state_, camera_, landmark.point);
   if (!predicted || !((pixel_px - *predicted).norm() < kAbsurdPx)) return false;
   const bool first = options_.consistency == SlamConsistency::kFirstEstimate;
@@ -102,12 +103,50 @@ bool SlamFilter::linearise(SlamLandmark& landmark, const Eigen::Vector2d& pixel_
   const auto jacobian = jacobian_of(at, layout_, camera_, point);
   if (!jacobian) return false;
   out.rows = 2;
+  if (sigma_px > 0) {
+    out.noise_cov.topLeftCorner<2, 2>() = sigma_px * sigma_px * Eigen::Matrix2d::Identity();
+    if (options_.second_order_noise && !landmark.point.converted) {
+      out.noise_cov.topLeftCorner<2, 2>() += product_cov(landmark, jacobian->by_way, transition_);
+    }
+  }
   out.head.topRows<2>() = jacobian->head;
   out.block = landmark.offset;
   out.block_dim = landmark.point.dim();
   out.block_jacobian.topRows<2>() = jacobian->block;
   out.residual.head<2>() = pixel_px - *predicted;
   return true;
+}
+
+// What the linear model leaves out where neither the depth nor the way is known, as at the start: their product, of
+// variance P_rho P_way. Without it a camera that has not moved yet takes all depths for what the prior says, and their
+// differences for motion. Source: Y. Bar-Shalom et al., "Estimation with applications to tracking and navigation",
+// 2001, 10.3.2 (second-order filter); the two errors are taken to be independent.
+Eigen::Matrix2d SlamFilter::product_cov(const SlamLandmark& landmark, const Eigen::Matrix<double, 2, 3>& by_way,
+                                        const SlamTransition& since) const {
+  const int anchor = landmark.offset + kAnchor;
+  const int rho = landmark.offset + kInverseDepth;
+  Eigen::Matrix3d body;
+  Eigen::Matrix3d anchors;
+  Eigen::Matrix3d between;
+  covariance_.read(anchor, anchor, anchors);
+  if (since.empty()) {
+    covariance_.read(kPosition, kPosition, body);
+    covariance_.read(anchor, kPosition, between);
+  } else {
+    const auto moves = since.f().middleRows<3>(kPosition);
+    Eigen::Matrix<double, kMaxHeadDim, kMaxHeadDim> all;
+    auto head = all.topLeftCorner(layout_.dim, layout_.dim);
+    covariance_.read(0, 0, head);
+    Eigen::Matrix<double, 3, kMaxHeadDim> moved;
+    moved.leftCols(layout_.dim) = moves.lazyProduct(head);
+    body = moved.leftCols(layout_.dim).lazyProduct(moves.transpose());
+    body += since.q().block<3, 3>(kPosition, kPosition);
+    auto with_head = moved.leftCols(layout_.dim);
+    covariance_.read(anchor, 0, with_head);
+    between = with_head.lazyProduct(moves.transpose());
+  }
+  const Eigen::Matrix3d way = body + anchors - between - between.transpose();
+  return covariance_(rho, rho) * (by_way * way * by_way.transpose());
 }
 
 // After a while without features the prior is so wide that Jacobians at it mean nothing. The pose that explains most
@@ -130,7 +169,7 @@ bool SlamFilter::approach(const FeaturesMeasurement& frame, SlamState& near) {
     BlockMeasurement& m = measurements_[i];
     m.noise_cov.topLeftCorner<2, 2>().setZero();
     const Eigen::Vector2d& pixel = frame.features[static_cast<std::size_t>(landmark.observation)].pixel_px;
-    const bool seen = linearise(landmark, pixel, m);
+    const bool seen = linearise(landmark, pixel, 0, m);
     depths_.push_back(seen ? std::sqrt(covariance_.innovation_cov(m).topLeftCorner<2, 2>().trace()) : kAbsurdPx);
   }
   if (depths_.size() < kFewestForPose) return false;
@@ -179,16 +218,15 @@ void SlamFilter::select_measured(const FeaturesMeasurement& frame) {
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     SlamLandmark& landmark = landmarks_[i];
     BlockMeasurement& measurement = measurements_[i];
-    measurement.noise_cov.topLeftCorner<2, 2>() = sigma * sigma * Eigen::Matrix2d::Identity();
     if (landmark.observation < 0) {
       // Where to look for it, and how far around.
-      if (landmark.visible && linearise(landmark, landmark.predicted_px, measurement)) {
+      if (landmark.visible && linearise(landmark, landmark.predicted_px, sigma, measurement)) {
         landmark.innovation_cov = covariance_.innovation_cov(measurement).topLeftCorner<2, 2>();
       }
       continue;
     }
     const Eigen::Vector2d& pixel = frame.features[static_cast<std::size_t>(landmark.observation)].pixel_px;
-    if (!linearise(landmark, pixel, measurement)) {
+    if (!linearise(landmark, pixel, sigma, measurement)) {
       landmark.state = SlamFeatureState::kRejected;
       continue;
     }
@@ -345,7 +383,7 @@ void SlamFilter::iterate(const FeaturesMeasurement& frame) {
         const auto at = static_cast<std::size_t>(which_[static_cast<std::size_t>(accepted_[k]) / 2]);
         BlockMeasurement& m = measurements_[at];
         const Eigen::Vector2d& z = frame.features[static_cast<std::size_t>(landmarks_[at].observation)].pixel_px;
-        good = linearise(landmarks_[at], z, m);
+        good = linearise(landmarks_[at], z, 0, m);
         if (!good) break;
         const Eigen::Vector2d r = m.residual.head<2>() + moved_by(m);
         accepted_residual_[k] = r[0];
@@ -362,7 +400,7 @@ void SlamFilter::iterate(const FeaturesMeasurement& frame) {
         const auto at = static_cast<std::size_t>(which_[static_cast<std::size_t>(accepted_[k]) / 2]);
         BlockMeasurement& m = measurements_[at];
         const Eigen::Vector2d& z = frame.features[static_cast<std::size_t>(landmarks_[at].observation)].pixel_px;
-        linearise(landmarks_[at], z, m);
+        linearise(landmarks_[at], z, 0, m);
         accepted_residual_[k] = m.residual[0];
         accepted_residual_[k + 1] = m.residual[1];
       }
@@ -386,7 +424,7 @@ void SlamFilter::rescue(const FeaturesMeasurement& frame) {
     if (landmark.state != SlamFeatureState::kRejected) continue;
     BlockMeasurement& measurement = measurements_[static_cast<std::size_t>(i)];
     const Eigen::Vector2d& pixel = frame.features[static_cast<std::size_t>(landmark.observation)].pixel_px;
-    if (!linearise(landmark, pixel, measurement)) continue;
+    if (!linearise(landmark, pixel, sigma_px(frame), measurement)) continue;
     which_.push_back(i);
   }
   if (which_.empty()) return;

@@ -51,6 +51,7 @@ std::optional<SlamJacobian> jacobian_of(const SlamState& state, const SlamLayout
   SlamJacobian out;
   out.head.setZero();
   out.block.setZero();
+  out.by_way.setZero();
   out.head.middleCols<3>(kTheta) = by_body * (so3::hat(body) + sight.rho * so3::hat(state.T_body_camera.translation));
   out.head.middleCols<3>(kPosition) = -sight.rho * by_world;
   if (layout.extrinsic_rotation >= 0) {
@@ -67,6 +68,7 @@ std::optional<SlamJacobian> jacobian_of(const SlamState& state, const SlamLayout
   } else {
     const InverseDepthPoint& p = point.inverse_depth;
     const Eigen::Vector3d camera_position = state.position + state.q_world_body * state.T_body_camera.translation;
+    out.by_way = by_world;
     out.block.middleCols<3>(kAnchor) = sight.rho * by_world;
     out.block.middleCols<2>(kRay) = by_world * p.ray_basis();
     out.block.col(kInverseDepth) = by_world * (p.anchor - camera_position);

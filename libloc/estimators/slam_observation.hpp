@@ -33,6 +33,9 @@ std::optional<Eigen::Vector2d> predict(const SlamState& state, const Camera& cam
 struct SlamJacobian {
   Eigen::Matrix<double, 2, kMaxHeadDim> head;  ///< the first layout.dim columns
   Eigen::Matrix<double, 2, kMaxBlockDim> block;
+  /// Second derivative by the inverse depth and the way from the camera to the anchor, whose product it is: pixel
+  /// += by_way * d(rho) * d(a - r). 0 of an XYZ point. [px]
+  Eigen::Matrix<double, 2, 3> by_way;
 };
 std::optional<SlamJacobian> jacobian_of(const SlamState& state, const SlamLayout& layout, const Camera& camera,
                                         const SlamPoint& point);

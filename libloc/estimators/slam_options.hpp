@@ -121,6 +121,9 @@ struct SlamOptions {
   // R.
   double sigma_px = 1.5;        ///< deviation of one coordinate, of frames that do not say
   bool override_sigma = false;  ///< sigma_px also in place of what frames say
+  /// A pixel's variance grows by what the product of the errors of depth and way makes: starts of a camera alone that
+  /// turns more than it moves come right more often; one that stands still at first gives away some of its accuracy.
+  bool second_order_noise = false;
 
   bool estimate_extrinsics = false;        ///< T_body_camera is part of the state
   double sigma_extrinsic_rotation = 0.01;  ///< [rad]

@@ -141,6 +141,7 @@ void visit_fields(Visitor& v, Options& o) requires std::is_same_v<std::remove_co
   v.field("gravity", o.gravity);
   v.field("sigma_px", o.sigma_px);
   v.field("override_sigma", o.override_sigma);
+  v.field("second_order_noise", o.second_order_noise);
   v.field("estimate_extrinsics", o.estimate_extrinsics);
   v.field("sigma_extrinsic_rotation", o.sigma_extrinsic_rotation);
   v.field("sigma_extrinsic_position", o.sigma_extrinsic_position);

@@ -219,6 +219,8 @@ void bind_slam_options_struct(py::module_& m) {
       .def_readwrite("gravity", &O::gravity, "[m/s^2]")
       .def_readwrite("sigma_px", &O::sigma_px, "R: deviation of one coordinate, of frames that do not say [px].")
       .def_readwrite("override_sigma", &O::override_sigma, "sigma_px also in place of what frames say.")
+      .def_readwrite("second_order_noise", &O::second_order_noise,
+                     "A pixel's variance grows by what the product of the errors of depth and way makes.")
       .def_readwrite("estimate_extrinsics", &O::estimate_extrinsics, "T_body_camera is part of the state.")
       .def_readwrite("sigma_extrinsic_rotation", &O::sigma_extrinsic_rotation, "[rad]")
       .def_readwrite("sigma_extrinsic_position", &O::sigma_extrinsic_position, "[m]")

@@ -553,6 +553,71 @@ TEST(InertialSlam, GapsAreToldAndSurvived) {
   }
 }
 
+// What a front end is told before a frame is what the filter itself expects then.
+TEST(MonoSlam, ExpectsFramesAsItFindsThem) {
+  for (const bool second_order : {false, true}) {
+    SlamOptions options = ride_options(SlamMotion::kConstantVelocity);
+    options.second_order_noise = second_order;
+    MonoSlam slam(options);
+    SlamRide world({});
+    SlamPrediction expected;
+    slam.predict_frame(0, expected);
+    EXPECT_FALSE(expected.valid) << "before the first frame";
+    for (int i = 0; i < 60; ++i) slam.process(*world.frame(i));
+    FeaturesMeasurement frame = *world.frame(60);
+    frame.sigma_px = kUnknown;
+    slam.predict_frame(frame.time_ns, expected);
+    ASSERT_TRUE(expected.valid);
+    const std::vector<SlamLandmark> map = slam.filter().landmarks();
+    ASSERT_EQ(expected.features.size(), map.size());
+    ASSERT_TRUE(slam.process(frame));
+    int compared = 0;
+    for (const SlamFeature& feature : slam.frame().features) {
+      const auto found = std::find_if(expected.features.begin(), expected.features.end(),
+                                      [&](const SlamFeaturePrediction& one) { return one.id == feature.id; });
+      if (found == expected.features.end() || !found->visible || !feature.innovation_cov.allFinite()) continue;
+      EXPECT_TRUE(test::near(found->pixel_px, feature.predicted_px, 1e-9));
+      EXPECT_LT((found->search_cov - feature.innovation_cov).norm(), 1e-6 * feature.innovation_cov.norm());
+      ++compared;
+    }
+    EXPECT_GT(compared, 20);
+    slam.predict_frame(frame.time_ns, expected);
+    EXPECT_FALSE(expected.valid) << "not after the last frame";
+    slam.predict_frame(frame.time_ns + from_seconds(options.max_gap_s + 0.1), expected);
+    EXPECT_FALSE(expected.valid) << "after a pause";
+    EXPECT_TRUE(expected.features.empty());
+  }
+}
+
+TEST(InertialSlam, ExpectsFramesAsItFindsThem) {
+  InertialSlam slam(ride_options(SlamMotion::kInertial));
+  SlamRide world({});
+  SlamPrediction expected;
+  double worst = 0;
+  int frames = 0;
+  world.run(8, [&](const Measurement& measurement) {
+    const auto* frame = std::get_if<FeaturesMeasurement>(&measurement);
+    if (frame != nullptr && SlamRide::time_s(frame->time_ns) > 4) {
+      slam.predict_frame(frame->time_ns, expected);
+      ASSERT_TRUE(expected.valid);
+    }
+    slam.process(measurement);
+    if (!expected.valid) return;
+    for (const SlamFrame& done : slam.frames()) {
+      if (done.time_ns != expected.time_ns) continue;
+      ++frames;
+      for (const SlamFeature& feature : done.features) {
+        for (const SlamFeaturePrediction& one : expected.features) {
+          if (one.id != feature.id || !one.visible || !feature.predicted_px.allFinite()) continue;
+          worst = std::max(worst, (one.pixel_px - feature.predicted_px).norm());
+        }
+      }
+    }
+  });
+  EXPECT_GT(frames, 60);
+  EXPECT_LT(worst, 0.5) << "all but the last samples of the IMU were there";
+}
+
 TEST(MonoSlam, GapsAndClocksSetBack) {
   MonoSlam slam(ride_options(SlamMotion::kConstantVelocity));
   SlamRide world({});
