@@ -1,0 +1,86 @@
+// SLAM from pictures: a front end (feature_tracker.hpp) and an estimator (mono_slam.hpp, inertial_slam.hpp) that tells
+// it where to look. The estimator itself sees tracks, never a picture.
+//
+//   ImageSlam<InertialSlam> slam(options);
+//   for (const Measurement& m : measurements) slam.process(m);    // pictures, IMU, in the order of their times
+#pragma once
+
+#include "libloc/estimators/inertial_slam.hpp"
+#include "libloc/estimators/mono_slam.hpp"
+#include "libloc/vision/feature_tracker.hpp"
+
+namespace loc {
+
+/// Settings of the filter for tracks of FeatureTracker, where they differ from the general ones: pixels good to one
+/// (errors that last included), features that stay inverse depth for longer, and for a camera alone the noise of second
+/// order, since pictures may begin in a turn.
+inline SlamOptions slam_options_for_images(SlamOptions options) {
+  options.sigma_px = 1;
+  options.map.max_linearity_index = 0.03;
+  options.second_order_noise = options.motion == SlamMotion::kConstantVelocity;
+  return options;
+}
+
+template <class Slam>
+class ImageSlam {
+ public:
+  /// @throws std::invalid_argument as the estimator's and FeatureTrackerOptions::check.
+  explicit ImageSlam(const SlamOptions& options, const FeatureTrackerOptions& front_end = {})
+      : slam_(options), tracker_(options.camera, front_end), camera_(options.camera_index) {}
+
+  // Estimator concept. Pictures of other cameras, and tracks, are not for it.
+  /// @throws std::invalid_argument for a picture of another size than the camera's, or a JPEG that is not decoded.
+  bool process(const Measurement& measurement) {
+    if (std::holds_alternative<FeaturesMeasurement>(measurement)) return false;
+    const auto* image = std::get_if<ImageMeasurement>(&measurement);
+    if (image == nullptr) {
+      const bool is_new = slam_.process(measurement);
+      learn();
+      return is_new;
+    }
+    if (image->camera != camera_) return false;
+    slam_.predict_frame(image->time_ns, prediction_);
+    features_ = tracker_.track(*image, &prediction_);
+    const bool is_new = slam_.process(features_);
+    if constexpr (std::is_same_v<Slam, MonoSlam>) {
+      if (is_new) tracker_.learn(slam_.frame());
+    } else {
+      learn();
+    }
+    return is_new;
+  }
+  Estimate estimate() const { return slam_.estimate(); }
+  NamedCounts counts() const {
+    NamedCounts out = slam_.counts();
+    for (NamedCount& count : tracker_.counts()) out.push_back(std::move(count));
+    return out;
+  }
+  void reset() {
+    slam_.reset();
+    tracker_.reset();
+  }
+
+  const Slam& slam() const { return slam_; }
+  const FeatureTracker& tracker() const { return tracker_; }
+  /// What the last picture's features were looked for by, and what was found.
+  const SlamPrediction& prediction() const { return prediction_; }
+  const FeaturesMeasurement& features() const { return std::get<FeaturesMeasurement>(features_); }
+
+ private:
+  void learn() {
+    if constexpr (!std::is_same_v<Slam, MonoSlam>) {
+      for (const SlamFrame& frame : slam_.frames()) tracker_.learn(frame);
+    }
+  }
+
+  Slam slam_;
+  FeatureTracker tracker_;
+  std::int32_t camera_;
+  SlamPrediction prediction_;
+  Measurement features_ = FeaturesMeasurement{};
+};
+
+static_assert(Estimator<ImageSlam<MonoSlam>>);
+static_assert(Estimator<ImageSlam<InertialSlam>>);
+
+}  // namespace loc
