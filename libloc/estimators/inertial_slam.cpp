@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "libloc/core/check.hpp"
 #include "libloc/geometry/so3.hpp"
@@ -72,6 +73,11 @@ void InertialSlam::skip(const char* count, std::uint32_t status) {
 
 void InertialSlam::reset() {
   filter_.stop();
+  forget();
+}
+
+// All but the filter, the options and the counts.
+void InertialSlam::forget() {
   rest_.reset();
   forget_early();
   while (!waiting_.empty()) waiting_.drop_front();
@@ -80,7 +86,7 @@ void InertialSlam::reset() {
   newest_ns_ = kNoTime;
   frames_set_back_ = 0;
   vibration_ = Vibration{};
-  status_ = next_status_ = 0;
+  frame_status_ = status_ = next_status_ = 0;
   frame_count_ = 0;
   carried_.reset();
   early_frames_ = rejected_in_a_row_ = 0;
@@ -100,8 +106,8 @@ void InertialSlam::forget_early() {
 }
 
 void InertialSlam::restore(const SlamSnapshot& snapshot) {
-  reset();
   filter_.restore(snapshot);
+  forget();
   restored_ = true;
 }
 
@@ -130,14 +136,20 @@ TimeNs InertialSlam::hold_back_ns() const {
 bool InertialSlam::receive(const ImuMeasurement& imu) {
   if (!usable(imu)) return false;
   // One sample far ahead is an error of the stamp, two are a pause.
-  if (newest_ns_ != kNoTime && to_seconds(imu.time_ns - newest_ns_) > options().max_imu_bridge_s) {
-    const double apart = leap_ ? to_seconds(imu.time_ns - leap_->time_ns) : -1;
-    const bool again = apart > 0 && apart <= options().max_imu_bridge_s;
-    if (leap_) skip("imu.skipped.alone_after_gap", kOutOfRange);
-    leap_ = imu;
-    if (!again) return false;
+  const std::optional<ImuMeasurement> leap = std::exchange(leap_, std::nullopt);
+  const double bridge = options().max_imu_bridge_s;
+  const bool ahead = newest_ns_ != kNoTime && to_seconds(imu.time_ns - newest_ns_) > bridge;
+  if (ahead && leap && imu.time_ns > leap->time_ns && to_seconds(imu.time_ns - leap->time_ns) <= bridge) {
+    const bool first = hold_back(*leap);
+    return hold_back(imu) || first;
   }
-  leap_.reset();
+  if (leap) skip("imu.skipped.alone_after_gap", kOutOfRange);
+  if (!ahead) return hold_back(imu);
+  leap_ = imu;
+  return false;
+}
+
+bool InertialSlam::hold_back(const ImuMeasurement& imu) {
   newest_ns_ = imu.time_ns;
   const TimeNs hold = hold_back_ns();
   if (hold == 0 && held_.empty()) return process_imu(imu);
@@ -238,10 +250,12 @@ bool InertialSlam::look_for_start() {
     // whole: whether it is rest, the picture tells, to about a pixel.
     std::size_t first = 0;
     while (first < waiting_.size() && on_imu_clock(waiting_[first].time_ns) < start_.samples().front().time_ns) ++first;
-    if (picture_rest_.stood_still(waiting_, first)) {
+    const TimeNs first_ns = first < waiting_.size() ? on_imu_clock(waiting_[first].time_ns) : kNoTime;
+    if (picture_rest_.stood_still(waiting_, first, first_ns)) {
       const double pixel = options().still_picture_px / options().camera.intrinsics_px.head<2>().minCoeff();
       const FusionStartEstimate from = start_.estimate_still(pixel / options().start.duration_s);
       begin(from.time_ns, from.state, from.covariance, "starts.at_rest");
+      rest_used_ns_ = last_imu_.time_ns;  // All until here is in the start already.
       replay_early();
       return true;
     }

@@ -56,7 +56,7 @@ class InertialSlam {
   SlamSnapshot snapshot() const { return filter_.snapshot(); }
   /// Goes on from there with the next IMU sample, which may be at any time: what happened between is unknown but for a
   /// body that went nowhere (as a gap of max_imu_bridge_s).
-  /// @throws std::invalid_argument as SlamFilter::restore.
+  /// @throws std::invalid_argument as SlamFilter::restore; the estimator is what it was then.
   void restore(const SlamSnapshot& snapshot);
 
  private:
@@ -73,6 +73,7 @@ class InertialSlam {
   };
 
   bool receive(const ImuMeasurement& imu);
+  bool hold_back(const ImuMeasurement& imu);
   bool process_imu(const ImuMeasurement& imu);
   TimeNs hold_back_ns() const;
   void process_frame(const FeaturesMeasurement& frame);
@@ -89,6 +90,7 @@ class InertialSlam {
   void widen(double angle, double position, double velocity);
   void bridge(const ImuMeasurement& imu);
   void start_anew();
+  void forget();
   void forget_early();
   InertialStepNoise noise_of(double dt_s) const;
   void see_vibration(const ImuMeasurement& imu);

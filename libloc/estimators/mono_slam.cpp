@@ -13,16 +13,22 @@ constexpr int kSetBackAfter = 10;
 // What is unknown after longer is no less known: the numbers must stay such that one can calculate with them. [s]
 constexpr double kLongestPause = 30;
 
+Estimate no_estimate() {
+  Estimate out;
+  out.covariance.setConstant(kUnknown);
+  out.status = kInitialising;
+  return out;
+}
+
 }  // namespace
 
-MonoSlam::MonoSlam(const SlamOptions& options) : filter_(options) {
+MonoSlam::MonoSlam(const SlamOptions& options) : filter_(options), estimate_(no_estimate()) {
   require(options.motion == SlamMotion::kConstantVelocity, "motion: MonoSlam has no IMU, InertialSlam does");
 }
 
 void MonoSlam::reset() {
   filter_.stop();
-  estimate_.valid = 0;
-  estimate_.status = kInitialising;
+  estimate_ = no_estimate();
   next_status_ = 0;
   restored_ = false;
   set_back_in_a_row_ = 0;
@@ -30,6 +36,8 @@ void MonoSlam::reset() {
 
 void MonoSlam::restore(const SlamSnapshot& snapshot) {
   filter_.restore(snapshot);
+  next_status_ = 0;
+  set_back_in_a_row_ = 0;
   restored_ = true;
 }
 

@@ -41,7 +41,7 @@ class MonoSlam {
 
   SlamSnapshot snapshot() const { return filter_.snapshot(); }
   /// Goes on from there: the next frame may come at any later time, or on another clock (a pause of unknown length).
-  /// @throws std::invalid_argument as SlamFilter::restore.
+  /// @throws std::invalid_argument as SlamFilter::restore; the estimator is what it was then.
   void restore(const SlamSnapshot& snapshot);
 
  private:

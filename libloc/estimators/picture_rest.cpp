@@ -65,13 +65,17 @@ bool PictureRest::stands_still(TimeNs now_ns) const {
          to_seconds(now_ns - picture_ns_) < kPictureIsOld;
 }
 
-bool PictureRest::stood_still(const Fifo<FeaturesMeasurement>& frames, std::size_t first) {
+bool PictureRest::stood_still(const Fifo<FeaturesMeasurement>& frames, std::size_t first, TimeNs first_ns) {
+  reset();
   if (frames.size() < first + 3) return false;
   moved_px(frames[first]);
   reference_.swap(picture_);
   for (std::size_t i = first + 1; i < frames.size(); ++i) {
-    if (!(moved_px(frames[i]) < kStillAtStart * still_px_)) return false;
+    if (moved_px(frames[i]) < kStillAtStart * still_px_) continue;
+    reset();
+    return false;
   }
+  reference_ns_ = picture_ns_ = first_ns;
   return true;
 }
 

@@ -31,8 +31,8 @@ class PictureRest {
   bool stands_still(TimeNs now_ns) const;
   /// Of frames that nobody has taken yet, from the one with that index on: none has moved away from the first one (by
   /// twice as much as above, since a body sways before the start). Fewer than three say nothing: false.
-  /// Their first one is the reference then.
-  bool stood_still(const Fifo<FeaturesMeasurement>& frames, std::size_t first);
+  /// The first one is the reference then, of that time on the IMU's clock.
+  bool stood_still(const Fifo<FeaturesMeasurement>& frames, std::size_t first, TimeNs first_ns);
 
  private:
   double moved_px(const FeaturesMeasurement& frame);

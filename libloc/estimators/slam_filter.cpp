@@ -1,5 +1,6 @@
 #include "libloc/estimators/slam_filter.hpp"
 
+#include <Eigen/Cholesky>
 #include <chrono>
 #include <cmath>
 #include <set>
@@ -14,6 +15,25 @@ namespace {
 constexpr int kFewest = 3;                    // features in a frame that hold a pose
 constexpr std::size_t kUsualFeatures = 1000;  // of a frame; more take memory once
 constexpr TimeNs kFarthestTime = 4'000'000'000'000'000'000;
+// How far rounding may leave correlations from what they can be.
+constexpr double kRounding = 1e-3;
+constexpr double kRoundingOfFloat = 0.1;
+
+// P is positive semidefinite by construction: points that were first seen in one frame share its place.
+void require_covariance(const Eigen::MatrixXd& p, double rounding) {
+  require((p.diagonal().array() >= 0).all(), "snapshot: a variance is negative");
+  const Eigen::VectorXd sigma = p.diagonal().cwiseSqrt();
+  const Eigen::VectorXd scale = (sigma.array() > 0).select(sigma.cwiseInverse(), 0.0);
+  Eigen::MatrixXd correlation = scale.asDiagonal() * p * scale.asDiagonal();
+  require((correlation - correlation.transpose()).cwiseAbs().maxCoeff() < rounding,
+          "snapshot: the covariance is not symmetric");
+  correlation.diagonal().array() += rounding;
+  for (Eigen::Index i = 0; i < p.rows(); ++i) {
+    if (!(sigma[i] > 0)) correlation(i, i) = 1;
+  }
+  require(Eigen::LLT<Eigen::MatrixXd>(correlation).info() == Eigen::Success,
+          "snapshot: the covariance is not positive semidefinite");
+}
 
 }  // namespace
 
@@ -361,7 +381,7 @@ void SlamFilter::restore(const SlamSnapshot& snapshot) {
           "snapshot: the covariance does not fit its features (motion model, estimate_extrinsics or "
           "estimate_time_offset may differ)");
   require(snapshot.time_ns != kNoTime && snapshot.covariance.allFinite(), "snapshot: not finite, or without a time");
-  require((snapshot.covariance.diagonal().array() >= 0).all(), "snapshot: a variance is negative");
+  require_covariance(snapshot.covariance, options_.precision == SlamPrecision::kFloat ? kRoundingOfFloat : kRounding);
   const SlamState& state = snapshot.state;
   const auto is_rotation = [](const Eigen::Quaterniond& q) { return std::abs(q.norm() - 1) < 1e-6; };
   require(is_rotation(state.q_world_body) && is_rotation(state.T_body_camera.rotation),
@@ -374,11 +394,15 @@ void SlamFilter::restore(const SlamSnapshot& snapshot) {
   for (const SlamLandmark& landmark : snapshot.landmarks) {
     const std::string name = "snapshot: feature " + std::to_string(landmark.id);
     require(ids.insert(landmark.id).second, name + " comes twice");
-    const InverseDepthPoint& p = landmark.point.inverse_depth;
-    const bool finite = landmark.point.converted
-                            ? landmark.point.position.allFinite() && landmark.first.position.allFinite()
-                            : p.anchor.allFinite() && is_rotation(p.frame) && std::isfinite(p.inverse_depth);
-    require(finite && std::isfinite(landmark.tries) && std::isfinite(landmark.hits), name + " is not finite");
+    const auto is_finite = [&](const SlamPoint& point) {
+      const InverseDepthPoint& p = point.inverse_depth;
+      if (point.converted) return point.position.allFinite();
+      return p.anchor.allFinite() && is_rotation(p.frame) && std::isfinite(p.inverse_depth);
+    };
+    require(landmark.first.converted == landmark.point.converted, name + " is of two kinds");
+    require(is_finite(landmark.point) && is_finite(landmark.first) && std::isfinite(landmark.tries) &&
+                std::isfinite(landmark.hits),
+            name + " is not finite");
   }
   time_ns_ = snapshot.time_ns;
   state_ = snapshot.state;
@@ -389,6 +413,9 @@ void SlamFilter::restore(const SlamSnapshot& snapshot) {
     landmark.last_measured_frame = -1;  // of another run: older than all of this
   covariance_.set_dense(snapshot.covariance);
   transition_.reset();
+  expected_.clear();
+  frame_.features.clear();
+  frame_.counts = SlamCounts{};
 }
 
 }  // namespace loc

@@ -126,7 +126,8 @@ class SlamFilter {
   NamedCounts counts() const;
 
   SlamSnapshot snapshot() const;
-  /// @throws std::invalid_argument when it does not fit the options.
+  /// @throws std::invalid_argument when it does not fit the options, or no filter can have made it: not finite, a
+  /// variance below zero, a covariance that is none. The filter is what it was then.
   void restore(const SlamSnapshot& snapshot);
 
  private:

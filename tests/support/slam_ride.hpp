@@ -25,7 +25,7 @@ struct SlamRideOptions {
   double drop_rate = 0;       ///< share of frames that do not come
   double blind_from_s = 1e9;  ///< no feature from here …
   double blind_to_s = 1e9;    ///< … to here
-  double glide = 0;       ///< along y at that speed [m/s], in place of the sines, after two seconds of speeding up
+  double glide = 0;           ///< along y at that speed [m/s], in place of the sines, after two seconds of speeding up
   bool imu_noise = true;
   Eigen::Vector3d gyroscope_bias{0.01, -0.02, 0.03};
   Eigen::Vector3d accelerometer_bias{0.05, -0.04, 0.06};
