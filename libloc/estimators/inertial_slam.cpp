@@ -86,6 +86,7 @@ void InertialSlam::forget() {
   newest_ns_ = kNoTime;
   frames_set_back_ = 0;
   vibration_ = Vibration{};
+  sample_ns_ = 0;
   frame_status_ = status_ = next_status_ = 0;
   frame_count_ = 0;
   carried_.reset();
@@ -391,6 +392,7 @@ void InertialSlam::see_vibration(const ImuMeasurement& imu) {
   const double dt = vibration_.last.time_ns == kNoTime ? 0 : to_seconds(imu.time_ns - vibration_.last.time_ns);
   if (dt > 0 && dt < options().max_imu_step_s) {
     const double part = std::min(1.0, dt / kVibrationTime);
+    sample_ns_ = imu.time_ns - vibration_.last.time_ns;
     const auto see = [&](double& mean, const Eigen::Vector3d& now, const Eigen::Vector3d& then) {
       mean += part * ((now - then).squaredNorm() / 6 - mean);
     };
@@ -459,6 +461,34 @@ void InertialSlam::start_anew() {
   forget_early();
 }
 
+void InertialSlam::take_frames_until(TimeNs until_ns, const ImuMeasurement& imu) {
+  while (!waiting_.empty()) {
+    const TimeNs time_ns = on_imu_clock(waiting_.front().time_ns);
+    if (time_ns > until_ns) break;
+    std::swap(taking_, waiting_[0]);
+    waiting_.drop_front();
+    if (time_ns < filter_.time_ns()) {
+      skip("features.skipped.late", kTooLate);
+      continue;
+    }
+    step_to(time_ns, imu);
+    take_frame(taking_);
+  }
+}
+
+bool InertialSlam::finish() {
+  frame_count_ = 0;
+  bool any = false;
+  while (!held_.empty()) any = process_imu(held_.pop_front()) || any;
+  if (!filter_.started() || restored_) return any;
+  // Between the last sample and where the next one would be, the IMU reads what it read last.
+  const TimeNs until_ns = last_.time_ns + sample_ns_;
+  ImuMeasurement same = last_imu_;
+  same.time_ns = until_ns;
+  take_frames_until(until_ns, same);
+  return any;
+}
+
 void InertialSlam::run(const ImuMeasurement& imu) {
   see_vibration(imu);
   const double dt = to_seconds(imu.time_ns - filter_.time_ns());
@@ -469,18 +499,7 @@ void InertialSlam::run(const ImuMeasurement& imu) {
     return;
   }
   if (dt > options().max_imu_step_s) bridge(imu);
-  while (!waiting_.empty()) {
-    const TimeNs time_ns = on_imu_clock(waiting_.front().time_ns);
-    if (time_ns > imu.time_ns) break;
-    std::swap(taking_, waiting_[0]);
-    waiting_.drop_front();
-    if (time_ns < filter_.time_ns()) {
-      skip("features.skipped.late", kTooLate);
-      continue;
-    }
-    step_to(time_ns, imu);
-    take_frame(taking_);
-  }
+  take_frames_until(imu.time_ns, imu);
   step_to(imu.time_ns, imu);
   last_imu_ = imu;
   ++imu_used_;

@@ -45,9 +45,14 @@ class InertialSlam {
   /// before the start, for a time before the last sample's that was used, or more than max_imu_bridge_s after it.
   void predict_frame(TimeNs time_ns, SlamPrediction& out) const;
 
+  /// The end of a recording: samples that are held back are used, and frames that wait for a sample after them, when
+  /// they are nearer to the last sample than the next one would be. frames() has them. It may go on.
+  /// @returns whether estimate() is new.
+  bool finish();
+
   bool running() const { return filter_.started(); }
-  /// Frames that the last process() has completed: usually none or one, at the start those that had waited. Their
-  /// estimates are at the frames' own times.
+  /// Frames that the last process() or finish() has completed: usually none or one, at the start those that had waited.
+  /// Their estimates are at the frames' own times.
   std::span<const SlamFrame> frames() const { return {frames_.data(), frame_count_}; }
   std::vector<SlamMapPoint> map() const { return filter_.map(); }
   const SlamFilter& filter() const { return filter_; }
@@ -86,6 +91,7 @@ class InertialSlam {
   void replay_early();
   void recover(const SlamFrame& frame);
   void run(const ImuMeasurement& imu);
+  void take_frames_until(TimeNs until_ns, const ImuMeasurement& imu);
   void step_to(TimeNs time_ns, const ImuMeasurement& to);
   void widen(double angle, double position, double velocity);
   void bridge(const ImuMeasurement& imu);
@@ -119,6 +125,7 @@ class InertialSlam {
   int frames_set_back_ = 0;             // in a row
   std::optional<Carried> carried_;
   Vibration vibration_;
+  TimeNs sample_ns_ = 0;  // between the last two samples
   bool at_rest_ = false;
   int rejected_in_a_row_ = 0;
   TimeNs last_good_frame_ns_ = kNoTime;

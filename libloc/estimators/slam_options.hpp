@@ -126,9 +126,9 @@ struct SlamOptions {
   bool second_order_noise = false;
 
   bool estimate_extrinsics = false;        ///< T_body_camera is part of the state
+  bool estimate_time_offset = false;       ///< camera.time_offset_s is
   double sigma_extrinsic_rotation = 0.01;  ///< [rad]
   double sigma_extrinsic_position = 0.01;  ///< [m]
-  bool estimate_time_offset = false;       ///< so is camera.time_offset_s
   double sigma_time_offset = 0.005;        ///< [s]
 
   std::vector<KnownLandmark> landmarks;

@@ -18,6 +18,11 @@ Eigen::Matrix2d block_of(const MapCovariance& covariance, int i, int j) {
   return out;
 }
 
+Eigen::Vector2d pair_of(const std::vector<double>& residual, int j) {
+  const std::size_t first = 2 * static_cast<std::size_t>(j);
+  return {residual[first], residual[first + 1]};
+}
+
 }  // namespace
 
 OnePointRansac::OnePointRansac(const SlamAssociationOptions& options, SlamMotion motion, int capacity)
@@ -34,9 +39,7 @@ OnePointRansac::OnePointRansac(const SlamAssociationOptions& options, SlamMotion
 double OnePointRansac::cost(const MapCovariance& covariance, const std::vector<double>& residual, double sigma, int by,
                             std::vector<char>& agrees) {
   const int count = static_cast<int>(agrees.size());
-  const auto r = [&](int j) {
-    return Eigen::Vector2d(residual[static_cast<std::size_t>(2 * j)], residual[static_cast<std::size_t>(2 * j + 1)]);
-  };
+  const auto r = [&](int j) { return pair_of(residual, j); };
   Eigen::Matrix2d inverse = Eigen::Matrix2d::Zero();
   double sum = 0;
   if (by >= 0) {
@@ -115,7 +118,7 @@ const std::vector<char>& OnePointRansac::compatible(const MapCovariance& covaria
     const std::size_t start = rows_.size();
     rows_.resize(start + 2 * (before + 2), 0.0);
     Eigen::Matrix2d cov = block_of(covariance, j, j);
-    Eigen::Vector2d left(residual[static_cast<std::size_t>(2 * j)], residual[static_cast<std::size_t>(2 * j + 1)]);
+    Eigen::Vector2d left = pair_of(residual, j);
     double* const first = rows_.data() + start;
     double* const second = first + before + 2;
     for (std::size_t k = 0; k < before; ++k) {

@@ -72,8 +72,7 @@ Eigen::VectorXd boxminus(const SlamState& a, const SlamState& b, const SlamLayou
   return error;
 }
 
-SlamTransition::SlamTransition(const SlamLayout& layout)
-    : motion_dim_(layout.motion_dim), f_(layout.dim, layout.dim), q_(layout.dim, layout.dim) {
+SlamTransition::SlamTransition(const SlamLayout& layout) : f_(layout.dim, layout.dim), q_(layout.dim, layout.dim) {
   reset();
 }
 

@@ -63,7 +63,6 @@ class SlamTransition {
 
  private:
   bool empty_ = true;
-  int motion_dim_;
   Eigen::MatrixXd f_;
   Eigen::MatrixXd q_;
 };

@@ -3,6 +3,7 @@
 #include <cstddef>
 
 // The Fortran interface, which every BLAS has; the hidden lengths of the character arguments are those of gfortran.
+// NOLINTBEGIN(readability-identifier-naming)
 extern "C" {
 void dgemm_(const char*, const char*, const int*, const int*, const int*, const double*, const double*, const int*,
             const double*, const int*, const double*, double*, const int*, std::size_t, std::size_t);
@@ -24,6 +25,7 @@ void dpotrf_(const char*, const int*, double*, const int*, int*, std::size_t);
 void spotrf_(const char*, const int*, float*, const int*, int*, std::size_t);
 char* openblas_get_corename() __attribute__((weak));
 }
+// NOLINTEND(readability-identifier-naming)
 
 namespace loc::blas {
 

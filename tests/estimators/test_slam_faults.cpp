@@ -106,6 +106,7 @@ TEST(SlamFaults, TheCameraAloneComesBackFromAFrameInTheFuture) {
       expect_usable(slam.estimate());
     }
     EXPECT_GE(used_after, 70);
+    EXPECT_EQ(count_of(slam.counts(), "features.out_of_range"), ahead > 100 * kDayNs ? 1 : 0);
     EXPECT_EQ(count_of(slam.counts(), "diverged"), 0);
     EXPECT_EQ(count_of(slam.counts(), "slam.failed_updates"), 0);
     EXPECT_EQ(slam.estimate().status & kFewFeatures, 0U);
@@ -261,6 +262,10 @@ SlamSnapshot good_snapshot(const SlamOptions& options) {
   return slam.snapshot();
 }
 
+FeaturesMeasurement frame_of(SlamRide& world) {
+  return *world.frame(0);
+}
+
 // A state that cannot be right is refused by name, and the estimator is what it was.
 TEST(SlamFaults, BrokenSnapshotsAreRefused) {
   const SlamOptions options = ride_options(SlamMotion::kInertial);
@@ -337,9 +342,13 @@ TEST(SlamFaults, ResetIsAFreshObject) {
   wild.seed = 7;
   wild.outlier_rate = 0.2;
   wild.rest_s = 3;
-  const auto compare = [&](auto used, auto fresh, auto again) {
-    SlamRide before(wild);
-    before.run(4.3, [&](const Measurement& measurement) { used.process(measurement); });
+  wild.blind_from_s = 4.2;  // its last frames say that there are few features
+  const auto compare = [&](auto used, auto fresh, auto again, const SlamRideOptions& ride) {
+    SlamRide before(ride);
+    before.run(4.3, [&](Measurement measurement) {
+      stamp_of(measurement).time_ns -= 100'000'000'000;
+      used.process(measurement);
+    });
     again(used);
     again(fresh);
     expect_same(used.estimate(), fresh.estimate());
@@ -360,10 +369,74 @@ TEST(SlamFaults, ResetIsAFreshObject) {
   const SlamOptions inertial = ride_options(SlamMotion::kInertial);
   const SlamOptions alone = ride_options(SlamMotion::kConstantVelocity);
   const auto reset = [](auto& slam) { slam.reset(); };
-  compare(InertialSlam(inertial), InertialSlam(inertial), reset);
-  compare(MonoSlam(alone), MonoSlam(alone), reset);
+  compare(InertialSlam(inertial), InertialSlam(inertial), reset, wild);
+  compare(MonoSlam(alone), MonoSlam(alone), reset, wild);
   const SlamSnapshot snapshot = good_snapshot(inertial);
-  compare(InertialSlam(inertial), InertialSlam(inertial), [&](auto& slam) { slam.restore(snapshot); });
+  const auto restore = [&](auto& slam) { slam.restore(snapshot); };
+  compare(InertialSlam(inertial), InertialSlam(inertial), restore, wild);
+  SlamRideOptions standing;  // its picture is that of the next ride's beginning
+  standing.rest_s = 10;
+  compare(InertialSlam(inertial), InertialSlam(inertial), restore, standing);
+}
+
+// The end of a recording: frames that wait for a sample after them are taken when it would not change what they say.
+TEST(SlamFaults, TheEndTakesTheFramesThatWait) {
+  const SlamOptions options = ride_options(SlamMotion::kInertial);
+  const auto last = [](const InertialSlam& slam) { return SlamRide::time_s(slam.frames().back().time_ns); };
+  SlamRide world({});
+  InertialSlam at_sample(options);
+  world.run(5, [&](const Measurement& measurement) { at_sample.process(measurement); });
+  ASSERT_EQ(count_of(at_sample.counts(), "features.waiting"), 0);
+
+  for (const double after : {0.0, 0.002, 0.005, 0.02}) {
+    // The last frame comes after the last sample.
+    InertialSlam slam(options);
+    SlamRide ride({});
+    FeaturesMeasurement frame;
+    ride.run(5, [&](const Measurement& measurement) {
+      if (const auto* f = std::get_if<FeaturesMeasurement>(&measurement); f != nullptr && f->sequence == 100) {
+        frame = *f;
+      } else {
+        slam.process(measurement);
+      }
+    });
+    frame.time_ns += from_seconds(after);  // as if it had been taken then: hardly anything moves in that time
+    EXPECT_FALSE(slam.process(frame));
+    EXPECT_EQ(count_of(slam.counts(), "features.waiting"), 1);
+    slam.finish();
+    const bool near = after < 0.01;
+    ASSERT_EQ(slam.frames().size(), near ? 1U : 0U) << after;
+    EXPECT_EQ(count_of(slam.counts(), "features.waiting"), near ? 0 : 1);
+    if (!near) continue;
+    EXPECT_NEAR(last(slam), 5 + after, 1e-9);
+    EXPECT_LT((slam.frames().back().estimate.position - world.pose(5 + after).translation).norm(), 0.05);
+    if (after == 0) {
+      EXPECT_EQ(slam.frames().back().estimate.position, at_sample.estimate().position) << "nothing is made up";
+    }
+    slam.finish();
+    EXPECT_TRUE(slam.frames().empty()) << "once";
+    // It may go on.
+    ImuMeasurement next = ride.imu(1001);
+    next.time_ns = SlamRide::time_ns(5.01);
+    EXPECT_TRUE(slam.process(next));
+    expect_usable(slam.estimate());
+  }
+
+  // Samples that are held back for a camera whose clock is ahead leave, too.
+  SlamOptions ahead = options;
+  ahead.camera.time_offset_s = -0.02;
+  InertialSlam slam(ahead);
+  SlamRide ride({});
+  ride.run(4, [&](const Measurement& measurement) { slam.process(measurement); });
+  EXPECT_NEAR(SlamRide::time_s(slam.estimate().time_ns), 3.98, 1e-9);
+  EXPECT_TRUE(slam.finish());
+  EXPECT_NEAR(SlamRide::time_s(slam.estimate().time_ns), 4, 1e-9);
+
+  InertialSlam empty(options);
+  EXPECT_FALSE(empty.finish());
+  empty.restore(good_snapshot(options));
+  EXPECT_FALSE(empty.process(frame_of(world)));
+  EXPECT_FALSE(empty.finish()) << "nobody knows when it is";
 }
 
 // In the dark there is nothing to add: nobody leaves the map for it, and it is said.

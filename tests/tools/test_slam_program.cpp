@@ -1,9 +1,11 @@
-// loc-estimator --method mono-slam and inertial-slam as processes: off line, live, replayed, with a map saved and
-// loaded.
+// loc-estimator --method mono-slam and inertial-slam as processes: off line, live, from logs, replayed by the stock
+// player, with a map saved and loaded.
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <fstream>
+#include <memory>
+#include <optional>
 
 #include "libloc/io/lcm_log.hpp"
 #include "libloc/io/rig_yaml.hpp"
@@ -91,12 +93,74 @@ class SlamProgram : public ::testing::Test {
                 path(log), "--estimator-args", "--method " + method},
                path("live.err"));
   }
+
+  /// An estimator and a logger on a hub of their own, and lcm-logplayer with the measurements of live.lcm.
+  class Replay {
+   public:
+    Replay(const SlamProgram& test, const std::string& method, const std::string& speed)
+        : test_(test),
+          speed_(speed),
+          log_(test.path(method + "-" + speed + ".lcm")),
+          hub_(test.folder_),
+          estimator_(start("loc-estimator",
+                           {"--method", method, "--config", test.path("rig.yaml"), "--exit-at-end", "--lcm-url",
+                            hub_.url, "--map-out", log_ + ".slam"},
+                           log_ + ".err")),
+          logger_(start("lcm-logger", {"--quiet", "--lcm-url=" + hub_.url, log_}, log_ + ".logger.err")),
+          publisher_(hub_.url) {}
+
+    /// Both have subscribed when the one has answered and the other has written.
+    bool ready() {
+      LcmReceiver receiver(hub_.url);
+      bool answered = false;
+      receiver.subscribe(kStatisticsChannel, [&](auto, auto) { answered = true; });
+      return wait_until(
+          [&] {
+            publisher_.publish(kSourceStatusChannel, source_status_t{});
+            receiver.handle(10);
+            std::error_code error;
+            return answered && std::filesystem::file_size(log_, error) > 0 && !error;
+          },
+          10 * kSecond);
+    }
+    void play() {
+      player_.emplace(start("lcm-logplayer",
+                            {"--speed=" + speed_, "--regexp=LOC_(IMU|TRACKS|SOURCE_STATUS)", "--lcm-url=" + hub_.url,
+                             test_.path("live.lcm")},
+                            log_ + ".player.err"));
+    }
+    /// The log, when all has come to its end and so many estimates are in it.
+    std::string end(std::size_t estimates) {
+      if (!player_->wait(10 * kSecond) || !player_->succeeded()) return "";
+      if (!estimator_.wait(10 * kSecond) || !estimator_.succeeded()) return "";
+      // The logger flushes when a message comes.
+      const bool whole = wait_until(
+          [&] {
+            publisher_.publish("LOC_OTHER", Bytes(10));
+            return estimates_in(log_).size() >= estimates && last_time_us(log_, kMapChannel) > 0;
+          },
+          5 * kSecond);
+      logger_.stop(2 * kSecond);
+      return whole ? log_ : "";
+    }
+
+   private:
+    const SlamProgram& test_;
+    std::string speed_;
+    std::string log_;
+    RunningHub hub_;
+    ChildProcess estimator_;
+    ChildProcess logger_;
+    std::optional<ChildProcess> player_;
+    LcmPublisher publisher_;
+  };
+
   TemporaryFolder folder_;
   SlamTracks tracks_;
 };
 
-// In real time, as fast as it goes, and from the log of that by the stock player: always the same.
-TEST_F(SlamProgram, LiveReplayAndOfflineAgreeBitForBit) {
+// As fast as it goes, off line, and off line from the log of that: always the same.
+TEST_F(SlamProgram, LiveAndOfflineAgreeBitForBit) {
   write(2.6);
   for (const std::string method : {"mono-slam", "inertial-slam"}) {
     ASSERT_EQ(offline(method, {"--config", path("rig.yaml"), "--output", path("offline.lcm")}), 0) << errors();
@@ -106,9 +170,8 @@ TEST_F(SlamProgram, LiveReplayAndOfflineAgreeBitForBit) {
     EXPECT_GE(estimates.size(), method == "mono-slam" ? frames.size() : 300U);
     EXPECT_GT(last_time_us(path("offline.lcm"), kMapChannel), 0);
 
-    const std::string speed = method == "mono-slam" ? "max" : "1";
     std::filesystem::remove(path("live.lcm"));
-    ASSERT_EQ(live(method, speed, "live.lcm"), 0) << text_of(path("live.err"));
+    ASSERT_EQ(live(method, "max", "live.lcm"), 0) << text_of(path("live.err"));
     EXPECT_EQ(estimates_in(path("live.lcm")), estimates) << method;
     EXPECT_EQ(frames_in(path("live.lcm")), frames) << method;
     EXPECT_GT(last_time_us(path("live.lcm"), kMapChannel), 0);
@@ -123,36 +186,47 @@ TEST_F(SlamProgram, LiveReplayAndOfflineAgreeBitForBit) {
     EXPECT_EQ(estimates_in(path("again.lcm")), estimates) << method;
     EXPECT_EQ(frames_in(path("again.lcm")), frames) << method;
   }
+}
 
-  const RunningHub hub(folder_);
-  ChildProcess estimator = start("loc-estimator",
-                                 {"--method", "inertial-slam", "--config", path("rig.yaml"), "--exit-at-end",
-                                  "--lcm-url", hub.url, "--map-out", path("replayed.slam")},
-                                 path("replay.err"));
-  LcmReceiver receiver(hub.url);
-  bool ready = false;
-  receiver.subscribe(kStatisticsChannel, [&](auto, auto) { ready = true; });
-  LcmPublisher publisher(hub.url);
-  ASSERT_TRUE(wait_until(
-      [&] {
-        publisher.publish(kSourceStatusChannel, source_status_t{});
-        receiver.handle(10);
-        return ready;
-      },
-      10 * kSecond));
-  ASSERT_EQ(run("lcm-logplayer",
-                {"--speed=10", "--regexp=LOC_(IMU|TRACKS|SOURCE_STATUS)", "--lcm-url=" + hub.url, path("live.lcm")},
-                path("err")),
-            0);
-  ASSERT_TRUE(estimator.wait(10 * kSecond));
-  EXPECT_TRUE(estimator.succeeded()) << text_of(path("replay.err"));
-  // The state at the end, all of its covariance included, says that everything before it was the same.
-  ASSERT_EQ(offline("inertial-slam",
-                    {"--config", path("rig.yaml"), "--output", path("e.tum"), "--map-out", path("offline.slam")}),
-            0);
-  const std::string state = read_file(path("offline.slam"));
-  EXPECT_GT(state.size(), 10'000U);
-  EXPECT_EQ(read_file(path("replayed.slam")), state);
+// Driver, LCM, estimator and logger in real time, then the measurements of that log by lcm-logplayer in real time and
+// eight times as fast: the same estimates, frames and saved state, of each method.
+TEST_F(SlamProgram, RealTimeAndLogplayerAtOneAndEightTimesAgree) {
+  write(2.6);
+  const std::string methods[] = {"inertial-slam", "mono-slam"};
+  ASSERT_EQ(live("inertial-slam", "1", "live.lcm"), 0) << text_of(path("live.err"));
+  for (const std::string& method : methods) {
+    ASSERT_EQ(offline(method, {"--config", path("rig.yaml"), "--output", path(method + ".lcm")}), 0) << errors();
+    ASSERT_EQ(
+        offline(method, {"--config", path("rig.yaml"), "--output", path("e.tum"), "--map-out", path(method + ".slam")}),
+        0)
+        << errors();
+  }
+  const auto estimates = estimates_in(path("inertial-slam.lcm"));
+  ASSERT_GE(estimates.size(), 300U);
+  EXPECT_EQ(estimates_in(path("live.lcm")), estimates) << "in real time";
+  EXPECT_EQ(frames_in(path("live.lcm")), frames_in(path("inertial-slam.lcm")));
+
+  for (const std::string speed : {"1", "8"}) {
+    // Both methods at once, each on the channels of its own hub.
+    std::vector<std::unique_ptr<Replay>> replays;
+    for (const std::string& method : methods) {
+      replays.push_back(std::make_unique<Replay>(*this, method, speed));
+      ASSERT_TRUE(replays.back()->ready()) << method;
+    }
+    for (const auto& replay : replays) replay->play();
+    for (std::size_t i = 0; i < replays.size(); ++i) {
+      const std::string& method = methods[i];
+      const auto expected = estimates_in(path(method + ".lcm"));
+      const std::string log = replays[i]->end(expected.size());
+      ASSERT_FALSE(log.empty()) << method << " at " << speed;
+      EXPECT_EQ(estimates_in(log), expected) << method << " at " << speed;
+      EXPECT_EQ(frames_in(log), frames_in(path(method + ".lcm"))) << method << " at " << speed;
+      // The state at the end, all of its covariance included.
+      const std::string state = read_file(path(method + ".slam"));
+      EXPECT_GT(state.size(), 10'000U);
+      EXPECT_EQ(read_file(log + ".slam"), state) << method << " at " << speed;
+    }
+  }
 }
 
 TEST_F(SlamProgram, MapIsSavedAndGoneOnFrom) {
@@ -160,10 +234,27 @@ TEST_F(SlamProgram, MapIsSavedAndGoneOnFrom) {
   // Without a rig: the recording has its camera.
   ASSERT_EQ(offline("inertial-slam", {"--output", path("e.tum"), "--map-out", path("m.slam")}), 0) << errors();
   const Trajectory trajectory = read_tum(path("e.tum")).trajectory;
+  // The start is found after a second; what the frames before it say is there as well.
+  ASSERT_GT(trajectory.times_ns.size(), 610U);
+  EXPECT_EQ(trajectory.times_ns.front(), tracks_.frames.front().time_ns);
+  EXPECT_EQ(trajectory.times_ns[1], tracks_.frames[1].time_ns);
+  EXPECT_EQ(trajectory.times_ns.back(), tracks_.samples.back().time_ns);
+  EXPECT_LT(trajectory.poses[10].translation.norm(), 0.01);
   // At rest for 1.5 s, then 0.5 (1 - cos 1.5 u) / 2 to the left; world is where the body began.
   const double u = to_seconds(trajectory.times_ns.back() - tracks_.samples.front().time_ns) - 1.5;
   EXPECT_NEAR(trajectory.poses.back().translation.norm(),
               std::hypot(0.25 * (1 - std::cos(1.5 * u)), 0.25 * (1 - std::cos(1.7 * 1.5 * u))), 0.1);
+  ASSERT_EQ(offline("inertial-slam", {"--output", path("e.csv")}), 0) << errors();
+  std::ifstream lines(path("e.csv"));
+  std::string line;
+  std::size_t rows = 0;
+  TimeNs last = kNoTime;
+  for (std::getline(lines, line); std::getline(lines, line); ++rows) {
+    const TimeNs time_ns = std::stoll(line);
+    EXPECT_GT(time_ns, last) << line;
+    last = time_ns;
+  }
+  EXPECT_EQ(rows, trajectory.times_ns.size());
   const SlamFile saved = load_slam(path("m.slam"));
   EXPECT_EQ(saved.motion, SlamMotion::kInertial);
   EXPECT_GT(saved.snapshot.landmarks.size(), 20U);

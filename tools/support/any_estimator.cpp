@@ -90,6 +90,13 @@ bool AnyEstimator::process(const Measurement& measurement) {
   return gave_estimate_;
 }
 
+bool AnyEstimator::finish() {
+  gave_estimate_ = false;
+  auto* inertial = std::get_if<InertialSlam>(&implementation_);
+  if (inertial != nullptr) gave_estimate_ = inertial->finish();
+  return gave_estimate_;
+}
+
 Estimate AnyEstimator::estimate() const {
   return std::visit([](const auto& estimator) { return estimator.estimate(); }, implementation_);
 }

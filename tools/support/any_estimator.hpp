@@ -49,9 +49,11 @@ class AnyEstimator {
   Estimate estimate() const;
   NamedCounts counts() const;
   void reset();
+  /// The end of a recording: what waits in the estimator is used. @returns whether estimate() is new.
+  bool finish();
 
   // Of SLAM; the others have nothing there.
-  /// Frames that the last process() has completed, until the next one.
+  /// Frames that the last process() or finish() has completed, until the next one.
   std::span<const SlamFrame> slam_frames() const;
   std::vector<SlamMapPoint> slam_map() const;
   /// @return nullptr before the start, too.

@@ -1,6 +1,7 @@
 #include "tools/support/estimate_output.hpp"
 
 #include <filesystem>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -15,34 +16,58 @@
 namespace loc {
 namespace {
 
-class CsvOutput : public EstimateOutput {
+// Lines of estimates in the order of their times. When SLAM has started it knows its frames from before that, too: they
+// come in front of the first estimate, or of the first one after a new start.
+class LinesOutput : public EstimateOutput {
  public:
-  explicit CsvOutput(const std::string& path) : writer_(path) {}
-  void write(const Estimate& estimate) override { writer_.write(estimate); }
-  void finish() override { writer_.flush(); }
+  void write(const Estimate& estimate) final {
+    write_first();
+    first_ = estimate;
+    if (any_ && (estimate.status & kReinitialised) == 0) write_first();
+    any_ = true;
+  }
+  void write_frame(const SlamFrame& frame) final {
+    const TimeNs time_ns = frame.estimate.time_ns;
+    if (first_ && time_ns > last_ns_ && time_ns < first_->time_ns) {
+      put(frame.estimate);
+      last_ns_ = time_ns;
+    }
+  }
+
+ protected:
+  virtual void put(const Estimate& estimate) = 0;
+  void write_first() {
+    if (!first_) return;
+    put(*first_);
+    last_ns_ = first_->time_ns;
+    first_.reset();
+  }
 
  private:
+  std::optional<Estimate> first_;  // waits for the frames before it
+  TimeNs last_ns_ = kNoTime;
+  bool any_ = false;
+};
+
+class CsvOutput : public LinesOutput {
+ public:
+  explicit CsvOutput(const std::string& path) : writer_(path) {}
+  void finish() override {
+    write_first();
+    writer_.flush();
+  }
+
+ private:
+  void put(const Estimate& estimate) override { writer_.write(estimate); }
+
   CsvWriter writer_;
 };
 
-class TumOutput : public EstimateOutput {
+class TumOutput : public LinesOutput {
  public:
   explicit TumOutput(std::string path) : path_(std::move(path)) {}
-  void write(const Estimate& estimate) override {
-    if ((estimate.valid & kValidOrientation) == 0) {
-      ++without_orientation_;
-      return;
-    }
-    if (!trajectory_.empty() && estimate.time_ns <= trajectory_.times_ns.back()) {
-      ++time_set_back_;
-      return;
-    }
-    const bool position = (estimate.valid & kValidPosition) != 0;
-    if (!position) ++without_position_;
-    trajectory_.push_back(estimate.time_ns,
-                          Pose3(estimate.q_world_body, position ? estimate.position : Eigen::Vector3d::Zero().eval()));
-  }
   void finish() override {
+    write_first();
     if (without_position_ > 0) {
       log_warning("event=no_position file=\"{}\" poses={} effect=\"the position column holds 0\"", path_,
                   without_position_);
@@ -58,6 +83,21 @@ class TumOutput : public EstimateOutput {
   }
 
  private:
+  void put(const Estimate& estimate) override {
+    if ((estimate.valid & kValidOrientation) == 0) {
+      ++without_orientation_;
+      return;
+    }
+    if (!trajectory_.empty() && estimate.time_ns <= trajectory_.times_ns.back()) {
+      ++time_set_back_;
+      return;
+    }
+    const bool position = (estimate.valid & kValidPosition) != 0;
+    if (!position) ++without_position_;
+    trajectory_.push_back(estimate.time_ns,
+                          Pose3(estimate.q_world_body, position ? estimate.position : Eigen::Vector3d::Zero().eval()));
+  }
+
   std::string path_;
   Trajectory trajectory_;
   std::int64_t without_position_ = 0;

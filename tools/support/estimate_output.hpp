@@ -17,7 +17,8 @@ class EstimateOutput {
   EstimateOutput& operator=(const EstimateOutput&) = delete;
   virtual ~EstimateOutput() = default;
   virtual void write(const Estimate& estimate) = 0;
-  /// Only LCM logs hold what SLAM says of its frames, and its map.
+  /// Only LCM logs hold what SLAM says of its frames, and its map. The others have the estimates of the frames that
+  /// were completed by a start, after the write() of the first estimate and before the next: their times are before it.
   virtual void write_frame(const SlamFrame& /*frame*/) {}
   virtual void write_map(const Stamp& /*stamp*/, std::span<const SlamMapPoint> /*map*/) {}
   /// To be called at the end. @throws DataError when not everything could be written.

@@ -85,6 +85,7 @@ void EstimatorPipeline::push(Measurement measurement) {
 void EstimatorPipeline::end() {
   merger_.finish();
   drain();
+  pass_on(estimator_.finish());
   ended_ = true;
 }
 
@@ -93,7 +94,11 @@ void EstimatorPipeline::drain() {
 }
 
 void EstimatorPipeline::process(const Measurement& measurement) {
-  if (estimator_.process(measurement)) {
+  pass_on(estimator_.process(measurement));
+}
+
+void EstimatorPipeline::pass_on(bool is_new) {
+  if (is_new) {
     ++estimates_;
     sink_(estimator_.estimate());
   }

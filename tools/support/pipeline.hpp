@@ -65,6 +65,7 @@ class EstimatorPipeline {
  private:
   void drain();
   void process(const Measurement& measurement);
+  void pass_on(bool is_new);
 
   AnyEstimator estimator_;
   Rig rig_;
