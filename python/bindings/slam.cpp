@@ -150,16 +150,22 @@ class PySlam {
     return slam_;
   }
 
-  SlamRun run(const SlamInput& in, std::optional<py::function> callback, bool with_covariance, bool with_features);
+  /// @param finish it is the end of the recording: frames that wait for the IMU are taken
+  SlamRun run(const SlamInput& in, std::optional<py::function> callback, bool with_covariance, bool with_features,
+              bool finish);
 
  private:
   void step(const loc::Measurement& measurement, SlamColumns& columns) {
     const bool has_estimate = slam_.process(measurement);
     if constexpr (kHasFrames<Slam>) {
-      for (const loc::SlamFrame& frame : slam_.frames()) columns.add(frame, frame.estimate);
+      take_frames(columns);
     } else if (has_estimate) {
       columns.add(slam_.frame(), slam_.estimate());
     }
+  }
+
+  void take_frames(SlamColumns& columns) requires kHasFrames<Slam> {
+    for (const loc::SlamFrame& frame : slam_.frames()) columns.add(frame, frame.estimate);
   }
 
   Slam slam_;
@@ -168,7 +174,7 @@ class PySlam {
 
 template <class Slam>
 SlamRun PySlam<Slam>::run(const SlamInput& in, std::optional<py::function> callback, bool with_covariance,
-                          bool with_features) {
+                          bool with_features, bool finish) {
   Slam& slam = idle();
   SlamColumns columns;
   columns.with_covariance = with_covariance;
@@ -206,6 +212,12 @@ SlamRun PySlam<Slam>::run(const SlamInput& in, std::optional<py::function> callb
       go_on = progress.go_on(i + 1);
     }
     if (go_on) feed_imu_until(std::numeric_limits<loc::TimeNs>::max());
+    if constexpr (kHasFrames<Slam>) {
+      if (go_on && finish) {
+        slam.finish();
+        take_frames(columns);
+      }
+    }
     map = slam.map();
   }
   SlamRun out = columns.take();
@@ -274,7 +286,13 @@ py::class_<PySlam<Slam>> bind_estimator(py::module_& m, const char* name, const 
           const auto frames = self.idle().frames();
           return std::vector<loc::SlamFrame>(frames.begin(), frames.end());
         },
-        "[SlamFrame]: those that the last process() has completed, usually none or one; at the start all that waited.");
+        "[SlamFrame]: those that the last process() or finish() has completed, usually none or one; at the start all "
+        "that waited.");
+    c.def(
+        "finish", [](P& self) { return self.idle().finish(); },
+        "The end of a recording: samples that are held back are used, and frames that wait for a sample after them, "
+        "when they are nearer to the last sample than the next one would be. Says whether estimate() is new; frames() "
+        "has the frames.");
   } else {
     c.def(
         "frame", [](P& self) { return self.idle().frame(); }, "SlamFrame: the last one that was used, a copy.");
@@ -297,7 +315,7 @@ void bind_slam(py::module_& m) {
              const std::optional<ArrayLike>& sigma_px, std::optional<py::function> progress, bool with_covariance,
              bool with_features) {
             const SlamInput in = input_of({time_ns, first, id, pixel_px, camera, sigma_px}, {}, self.idle().options());
-            return self.run(in, std::move(progress), with_covariance, with_features);
+            return self.run(in, std::move(progress), with_covariance, with_features, false);
           },
           py::arg("time_ns"), py::arg("first"), py::arg("id"), py::arg("pixel_px"), py::kw_only(),
           py::arg("camera") = py::none(), py::arg("sigma_px") = py::none(), py::arg("progress") = py::none(),
@@ -311,15 +329,16 @@ void bind_slam(py::module_& m) {
           [](PySlam<InertialSlam>& self, const TimeArray& time_ns, const TimeArray& first, const TimeArray& id,
              const FloatArray& pixel_px, const TimeArray& imu_time_ns, const FloatArray& gyro, const FloatArray& force,
              const std::optional<ArrayLike>& camera, const std::optional<ArrayLike>& sigma_px,
-             std::optional<py::function> progress, bool with_covariance, bool with_features) {
+             std::optional<py::function> progress, bool with_covariance, bool with_features, bool finish) {
             const SlamInput in = input_of({time_ns, first, id, pixel_px, camera, sigma_px}, {imu_time_ns, gyro, force},
                                           self.idle().options());
-            return self.run(in, std::move(progress), with_covariance, with_features);
+            return self.run(in, std::move(progress), with_covariance, with_features, finish);
           },
           py::arg("time_ns"), py::arg("first"), py::arg("id"), py::arg("pixel_px"), py::arg("imu_time_ns"),
           py::arg("gyro"), py::arg("force"), py::kw_only(), py::arg("camera") = py::none(),
           py::arg("sigma_px") = py::none(), py::arg("progress") = py::none(), py::arg("with_covariance") = true,
-          py::arg("with_features") = false, kRunDoc);
+          py::arg("with_features") = false, py::arg("finish") = false,
+          (std::string(kRunDoc) + " finish: it is the end of the recording, see finish().").c_str());
 }
 
 }  // namespace locpy

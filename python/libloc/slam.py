@@ -135,4 +135,4 @@ def run_slam(
     inertial = InertialSlam(options)
     if start_from is not None:
         inertial.restore(start_from)
-    return inertial.run(*frames, imu.times_ns, gyro, force, **settings)
+    return inertial.run(*frames, imu.times_ns, gyro, force, finish=True, **settings)

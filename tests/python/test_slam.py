@@ -327,6 +327,8 @@ def test_with_an_imu_step_by_step_is_the_whole_recording(walk):
     for k in range(used, len(imu.times_ns)):
         slam.process(libloc.ImuMeasurement(imu.times_ns[k], imu.angular_velocity[k], imu.specific_force[k]))
         frames += slam.frames()
+    assert not slam.finish()  # nothing that is newer than the last sample's estimate
+    frames += slam.frames()
     assert waited > 5  # those of before the start
     assert len(frames) == len(whole) > 170
     assert np.array_equal(whole.time_ns, [f.time_ns for f in frames])
@@ -354,6 +356,24 @@ def test_with_an_imu_step_by_step_is_the_whole_recording(walk):
     assert np.rad2deg(np.arccos(np.clip(np.sum(up * true_up, axis=1), -1, 1))).max() < 1
 
 
+def test_the_last_frame_waits_for_the_imu_until_the_end(walk):
+    recording, rig = walk
+    f, imu = recording.features, recording.imu
+    there = imu.times_ns <= f.times_ns[-1]
+    runs = [
+        libloc.InertialSlam(inertial_options(rig)).run(
+            f.times_ns, f.first, f.id, f.pixel_px, imu.times_ns[there], imu.angular_velocity[there],
+            imu.specific_force[there], sigma_px=f.sigma_px, finish=finish,
+        )
+        for finish in (False, True)
+    ]  # fmt: skip
+    assert len(runs[1]) == len(runs[0]) + 1
+    assert runs[1].time_ns[-1] == f.times_ns[-1]
+    assert np.array_equal(runs[1].position[:-1], runs[0].position)
+    assert runs[0].totals["features.waiting"] == 1
+    assert runs[1].totals["features.waiting"] == 0
+
+
 def test_the_rig_corrects_the_imu(walk):
     recording, rig = walk
     options = inertial_options(rig)
@@ -369,7 +389,7 @@ def test_the_rig_corrects_the_imu(walk):
     by_hand = slam.run(
         f.times_ns, f.first, f.id, f.pixel_px, recording.imu.times_ns,
         recording.imu.angular_velocity - imu.gyroscope.bias, recording.imu.specific_force,
-        sigma_px=f.sigma_px,
+        sigma_px=f.sigma_px, finish=True,
     )  # fmt: skip
     corrected = libloc.run_slam(recording, options, rig=other)
     assert np.array_equal(corrected.position, by_hand.position)
