@@ -85,7 +85,7 @@ struct SlamAssociationOptions {
   void check() const;
 };
 
-struct SlamOptions {  // NOLINT(clang-analyzer-optin.performance.Padding): in the order of what they mean
+struct SlamOptions {
   SlamMotion motion = SlamMotion::kConstantVelocity;
   SlamConsistency consistency = SlamConsistency::kInvariant;
   SlamPrecision precision = SlamPrecision::kDouble;
