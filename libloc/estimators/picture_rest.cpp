@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace loc {
 namespace {
@@ -13,8 +14,8 @@ constexpr double kPictureIsOld = 0.5;         // says nothing of now [s]
 
 }  // namespace
 
-PictureRest::PictureRest(const Eigen::Vector2d& centre_px, double still_px, double still_s)
-    : centre_px_(centre_px), still_px_(still_px), still_s_(still_s) {
+PictureRest::PictureRest(Eigen::Vector2d centre_px, double still_px, double still_s)
+    : centre_px_(std::move(centre_px)), still_px_(still_px), still_s_(still_s) {
   picture_.reserve(kUsualFeatures);
   reference_.reserve(kUsualFeatures);
   for (std::vector<double>& moves : moves_) moves.reserve(kUsualFeatures);

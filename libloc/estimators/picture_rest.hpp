@@ -21,7 +21,7 @@ class PictureRest {
   /// @param centre_px of the picture: where the optical axis meets it
   /// @param still_px a picture that is nearer to the reference has not moved [px]
   /// @param still_s … and stands still when that holds for so long [s]
-  PictureRest(const Eigen::Vector2d& centre_px, double still_px, double still_s);
+  PictureRest(Eigen::Vector2d centre_px, double still_px, double still_s);
 
   /// Forgets what was seen.
   void reset();
