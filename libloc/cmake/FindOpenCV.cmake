@@ -1,6 +1,6 @@
 # The modules of OpenCV 4 that are named as components, each as target opencv_NAME. OpenCV's own configuration is taken
 # where there is one; in Debian only the whole libopencv-dev brings it, which is 600 MB more than the modules' packages
-# (libopencv-videoio-dev), hence the search of headers and libraries.
+# (libopencv-videoio-dev, libopencv-calib3d-dev), hence the search of headers and libraries.
 set(loc_opencv_quiet "${OpenCV_FIND_QUIETLY}")
 find_package(OpenCV ${OpenCV_FIND_VERSION} CONFIG QUIET COMPONENTS ${OpenCV_FIND_COMPONENTS})
 set(loc_opencv_found TRUE)
@@ -23,7 +23,7 @@ else()
   set(OpenCV_FIND_QUIETLY "${loc_opencv_quiet}")
   include(FindPackageHandleStandardArgs)
   find_package_handle_standard_args(OpenCV REQUIRED_VARS ${loc_opencv_required}
-    REASON_FAILURE_MESSAGE "Debian: libopencv-videoio-dev")
+    REASON_FAILURE_MESSAGE "Debian: libopencv-videoio-dev libopencv-calib3d-dev")
   if(OpenCV_FOUND)
     foreach(loc_module IN LISTS OpenCV_FIND_COMPONENTS)
       add_library(opencv_${loc_module} UNKNOWN IMPORTED)

@@ -26,6 +26,10 @@ set(loc_installs_vision FALSE)
 if(TARGET loc_vision)
   set(loc_installs_vision TRUE)
 endif()
+set(loc_installs_apriltag FALSE)
+if(loc_installs_vision AND TARGET apriltag::apriltag)
+  set(loc_installs_apriltag TRUE)
+endif()
 configure_package_config_file("${CMAKE_CURRENT_LIST_DIR}/liblocConfig.cmake.in"
   "${PROJECT_BINARY_DIR}/liblocConfig.cmake" INSTALL_DESTINATION "${loc_package_dir}"
   NO_SET_AND_CHECK_MACRO NO_CHECK_REQUIRED_COMPONENTS_MACRO)

@@ -1,0 +1,141 @@
+// Checkerboards: OpenCV finds them, here they are checked, numbered and refined.
+#include <algorithm>
+#include <cmath>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "libloc/vision/target_search.hpp"
+
+namespace loc::vision {
+namespace {
+
+using Corners = std::vector<cv::Point2f>;
+
+constexpr int kSearchSide = 1200;  // [px] larger pictures are searched at half the size, or less
+
+// A grid of corners as found, to be read in another order.
+struct Grid {
+  Corners corners;
+  int columns;
+  int rows;
+  cv::Point2f at(int column, int row) const {
+    return corners[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+                   static_cast<std::size_t>(column)];
+  }
+  Grid turned() const {  // by half a turn
+    Grid out = *this;
+    std::ranges::reverse(out.corners);
+    return out;
+  }
+  Grid mirrored() const {  // rows from the other side
+    Grid out = *this;
+    for (int r = 0; r < rows; ++r) {
+      for (int c = 0; c < columns; ++c) {
+        out.corners[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(c)] =
+            at(c, rows - 1 - r);
+      }
+    }
+    return out;
+  }
+};
+
+bool search(const cv::Mat& gray, const cv::Size& size, bool thorough, Corners& corners) {
+  constexpr int kQuick = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK;
+  if (cv::findChessboardCorners(gray, size, corners, kQuick)) return true;
+  if (!thorough) return false;
+  return cv::findChessboardCornersSB(gray, size, corners, cv::CALIB_CB_NORMALIZE_IMAGE);
+}
+
+// Shortest side of a square, and whether the corners are a regular grid: each between its neighbours.
+bool regular(const Grid& grid, double& spacing) {
+  spacing = 1e9;
+  const auto check_line = [&](const cv::Point2f& a, const cv::Point2f& b, const cv::Point2f& c) {
+    const double whole = cv::norm(c - a);
+    return cv::norm((a + c) * 0.5F - b) < 0.2 * whole;
+  };
+  for (int r = 0; r < grid.rows; ++r) {
+    for (int c = 0; c < grid.columns; ++c) {
+      const cv::Point2f p = grid.at(c, r);
+      if (c + 1 < grid.columns) spacing = std::min(spacing, cv::norm(grid.at(c + 1, r) - p));
+      if (r + 1 < grid.rows) spacing = std::min(spacing, cv::norm(grid.at(c, r + 1) - p));
+      if (c > 0 && c + 1 < grid.columns && !check_line(grid.at(c - 1, r), p, grid.at(c + 1, r))) return false;
+      if (r > 0 && r + 1 < grid.rows && !check_line(grid.at(c, r - 1), p, grid.at(c, r + 1))) return false;
+    }
+  }
+  return spacing > 2;
+}
+
+// Mean brightness of the squares inside the grid whose column + row is even, less that of the odd ones.
+std::optional<double> even_less_odd(const cv::Mat& gray, const Grid& grid) {
+  double sums[2] = {0, 0};
+  int counts[2] = {0, 0};
+  for (int r = 0; r + 1 < grid.rows; ++r) {
+    for (int c = 0; c + 1 < grid.columns; ++c) {
+      const cv::Point2f middle =
+          (grid.at(c, r) + grid.at(c + 1, r) + grid.at(c, r + 1) + grid.at(c + 1, r + 1)) * 0.25F;
+      const auto value = brightness(gray, middle);
+      if (!value) return std::nullopt;
+      sums[(c + r) % 2] += *value;
+      ++counts[(c + r) % 2];
+    }
+  }
+  if (counts[0] == 0 || counts[1] == 0) return std::nullopt;
+  return sums[0] / counts[0] - sums[1] / counts[1];
+}
+
+// So that x is right, y up on a board that is looked at from its front, and the corner's square of the board is black.
+Grid numbered(const cv::Mat& gray, Grid grid) {
+  const cv::Point2f along_x = grid.at(grid.columns - 1, 0) - grid.at(0, 0);
+  const cv::Point2f along_y = grid.at(0, grid.rows - 1) - grid.at(0, 0);
+  if (along_x.cross(along_y) > 0) grid = grid.mirrored();  // in the picture y counts downwards
+  // Squares (0, 0) and (-1, -1), diagonal neighbours, have one colour.
+  const auto difference = even_less_odd(gray, grid);
+  if (difference && *difference > 0 && (grid.columns + grid.rows) % 2 == 1) grid = grid.turned();
+  return grid;
+}
+
+}  // namespace
+
+TargetDetection find_checkerboard(const cv::Mat& gray, const CalibrationTarget& target,
+                                  const TargetDetectorOptions& options) {
+  TargetDetection out;
+  const int shrink = std::max(1, (std::max(gray.cols, gray.rows) + kSearchSide - 1) / kSearchSide);
+  cv::Mat searched = gray;
+  if (shrink > 1) cv::resize(gray, searched, {gray.cols / shrink, gray.rows / shrink}, 0, 0, cv::INTER_AREA);
+  Grid grid{{}, target.columns, target.rows};
+  bool found = search(searched, {grid.columns, grid.rows}, options.thorough, grid.corners);
+  if (!found && shrink > 1 && options.thorough) {
+    found = search(gray, {grid.columns, grid.rows}, true, grid.corners);
+  } else if (found && shrink > 1) {
+    const float x = static_cast<float>(gray.cols) / static_cast<float>(searched.cols);
+    const float y = static_cast<float>(gray.rows) / static_cast<float>(searched.rows);
+    for (cv::Point2f& p : grid.corners) p = {(p.x + 0.5F) * x - 0.5F, (p.y + 0.5F) * y - 0.5F};
+  }
+  const std::string size = std::to_string(target.columns) + " x " + std::to_string(target.rows);
+  double spacing = 0;
+  if (!found || grid.corners.size() != static_cast<std::size_t>(target.corner_count()) || !regular(grid, spacing)) {
+    out.reason = "no checkerboard of " + size + " inner corners";
+    return out;
+  }
+  const auto contrast = even_less_odd(gray, grid);
+  if (target.columns > 2 && target.rows > 2 && !(contrast && std::abs(*contrast) >= options.min_contrast)) {
+    out.reason = "the checkerboard has too little contrast";
+    return out;
+  }
+  grid = numbered(gray, std::move(grid));
+  // A third of the shortest side: no window reaches the next corner.
+  const int half_side = std::clamp(static_cast<int>(spacing / 3), 2, 5 * shrink);
+  const std::vector<bool> good =
+      refine_corners(gray, grid.corners, half_side, 0.25 * spacing + shrink, options.max_disagreement_px);
+  for (std::size_t i = 0; i < grid.corners.size(); ++i) {
+    if (!good[i]) {
+      ++out.corners_left_out;
+      continue;
+    }
+    out.view.corners.push_back({static_cast<std::int32_t>(i), {grid.corners[i].x, grid.corners[i].y}});
+  }
+  if (out.view.corners.empty()) out.reason = "no corner of the checkerboard is sharp enough to be placed";
+  return out;
+}
+
+}  // namespace loc::vision
