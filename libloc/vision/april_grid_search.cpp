@@ -1,5 +1,4 @@
 // AprilGrids: the library apriltag finds first tags, the grid is grown from them.
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -293,29 +292,14 @@ class Growth {
       }
     }
     if (board.size() < 4) return std::nullopt;
-    if (board.size() < 10) {
+    if (board.size() < kFewestForSmooth) {
       const cv::Mat found = cv::findHomography(board, pixels, 0);
       if (found.empty()) return std::nullopt;
       return Expected{cv::Point2d(apply(cv::Matx33d(found), 0, 0)), 0.07};
     }
-    // Strays among them are outvoted: a second and third time with less weight for those that fit badly.
-    Eigen::Matrix<double, 6, 2> solution;
-    for (int round = 0; round < 3; ++round) {
-      Eigen::Matrix<double, 6, 6> A = 1e-9 * Eigen::Matrix<double, 6, 6>::Identity();
-      Eigen::Matrix<double, 6, 2> b = Eigen::Matrix<double, 6, 2>::Zero();
-      for (std::size_t n = 0; n < board.size(); ++n) {
-        const cv::Point2d& p = board[n];
-        Eigen::Matrix<double, 6, 1> row;
-        row << 1, p.x, p.y, p.x * p.x, p.x * p.y, p.y * p.y;
-        const Eigen::RowVector2d pixel(pixels[n].x, pixels[n].y);
-        const double w = round == 0 ? 1 : 1 / (1 + (row.transpose() * solution - pixel).squaredNorm());
-        A += w * row * row.transpose();
-        b += w * row * pixel;
-      }
-      solution = A.ldlt().solve(b);
-    }
-    if (!solution.allFinite()) return std::nullopt;
-    return Expected{cv::Point2d(solution(0, 0), solution(0, 1)), 0.04};
+    const auto place = smooth_place(board, pixels);
+    if (!place) return std::nullopt;
+    return Expected{*place, 0.04};
   }
 
   bool add(int tag, const Quad& rough, float max_way) {

@@ -11,7 +11,8 @@ namespace {
 
 using Corners = std::vector<cv::Point2f>;
 
-constexpr int kSearchSide = 1200;  // [px] larger pictures are searched at half the size, or less
+constexpr int kQuickSide = 480;  // [px] larger pictures are searched at half the size, or less
+constexpr int kSearchSide = 1200;
 
 // A grid of corners as found, to be read in another order.
 struct Grid {
@@ -39,11 +40,42 @@ struct Grid {
   }
 };
 
+// By how much a picture is made smaller so that its longer side is at most so long.
+int shrink_to(const cv::Mat& gray, int side) {
+  return (std::max(gray.cols, gray.rows) + side - 1) / side;
+}
+
+// A picture that is shrunk, and corners in it put back to the whole one.
+class Smaller {
+ public:
+  Smaller(const cv::Mat& gray, int shrink) : whole_(gray.size()), picture_(gray) {
+    if (shrink > 1) cv::resize(gray, picture_, {gray.cols / shrink, gray.rows / shrink}, 0, 0, cv::INTER_AREA);
+  }
+  const cv::Mat& picture() const { return picture_; }
+  void put_back(Corners& corners) const {
+    const float x = static_cast<float>(whole_.width) / static_cast<float>(picture_.cols);
+    const float y = static_cast<float>(whole_.height) / static_cast<float>(picture_.rows);
+    for (cv::Point2f& p : corners) p = {(p.x + 0.5F) * x - 0.5F, (p.y + 0.5F) * y - 0.5F};
+  }
+
+ private:
+  cv::Size whole_;
+  cv::Mat picture_;
+};
+
+// The quick search takes seconds in a large picture that shows a part of the board only: it gets a small one.
 bool search(const cv::Mat& gray, const cv::Size& size, bool thorough, Corners& corners) {
   constexpr int kQuick = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK;
-  if (cv::findChessboardCorners(gray, size, corners, kQuick)) return true;
+  const Smaller small(gray, shrink_to(gray, kQuickSide));
+  if (cv::findChessboardCorners(small.picture(), size, corners, kQuick)) {
+    small.put_back(corners);
+    return true;
+  }
   if (!thorough) return false;
-  return cv::findChessboardCornersSB(gray, size, corners, cv::CALIB_CB_NORMALIZE_IMAGE);
+  const Smaller searched(gray, shrink_to(gray, kSearchSide));
+  if (!cv::findChessboardCornersSB(searched.picture(), size, corners, cv::CALIB_CB_NORMALIZE_IMAGE)) return false;
+  searched.put_back(corners);
+  return true;
 }
 
 // Shortest side of a square, and whether the corners are a regular grid: each between its neighbours.
@@ -94,23 +126,35 @@ Grid numbered(const cv::Mat& gray, Grid grid) {
   return grid;
 }
 
+// True for a corner that lies where those around it say.
+bool among_neighbours(const Grid& grid, const std::vector<bool>& good, int column, int row) {
+  std::vector<cv::Point2d> board;
+  std::vector<cv::Point2d> pixels;
+  const cv::Point2f corner = grid.at(column, row);
+  double spacing = 1e9;
+  for (int reach = 2; reach <= 4 && board.size() < kFewestForSmooth; ++reach) {  // at the border there are fewer
+    board.clear();
+    pixels.clear();
+    for (int r = std::max(0, row - reach); r <= std::min(grid.rows - 1, row + reach); ++r) {
+      for (int c = std::max(0, column - reach); c <= std::min(grid.columns - 1, column + reach); ++c) {
+        if ((r == row && c == column) || !good[static_cast<std::size_t>(r * grid.columns + c)]) continue;
+        board.emplace_back(c - column, r - row);
+        pixels.emplace_back(grid.at(c, r));
+        spacing = std::min(spacing, cv::norm(grid.at(c, r) - corner));
+      }
+    }
+  }
+  const auto expected = smooth_place(board, pixels);
+  return !expected || cv::norm(*expected - cv::Point2d(corner)) <= 0.08 * spacing + 0.6;
+}
+
 }  // namespace
 
 TargetDetection find_checkerboard(const cv::Mat& gray, const CalibrationTarget& target,
                                   const TargetDetectorOptions& options) {
   TargetDetection out;
-  const int shrink = std::max(1, (std::max(gray.cols, gray.rows) + kSearchSide - 1) / kSearchSide);
-  cv::Mat searched = gray;
-  if (shrink > 1) cv::resize(gray, searched, {gray.cols / shrink, gray.rows / shrink}, 0, 0, cv::INTER_AREA);
   Grid grid{{}, target.columns, target.rows};
-  bool found = search(searched, {grid.columns, grid.rows}, options.thorough, grid.corners);
-  if (!found && shrink > 1 && options.thorough) {
-    found = search(gray, {grid.columns, grid.rows}, true, grid.corners);
-  } else if (found && shrink > 1) {
-    const float x = static_cast<float>(gray.cols) / static_cast<float>(searched.cols);
-    const float y = static_cast<float>(gray.rows) / static_cast<float>(searched.rows);
-    for (cv::Point2f& p : grid.corners) p = {(p.x + 0.5F) * x - 0.5F, (p.y + 0.5F) * y - 0.5F};
-  }
+  const bool found = search(gray, {grid.columns, grid.rows}, options.thorough, grid.corners);
   const std::string size = std::to_string(target.columns) + " x " + std::to_string(target.rows);
   double spacing = 0;
   if (!found || grid.corners.size() != static_cast<std::size_t>(target.corner_count()) || !regular(grid, spacing)) {
@@ -124,11 +168,12 @@ TargetDetection find_checkerboard(const cv::Mat& gray, const CalibrationTarget& 
   }
   grid = numbered(gray, std::move(grid));
   // A third of the shortest side: no window reaches the next corner.
-  const int half_side = std::clamp(static_cast<int>(spacing / 3), 2, 5 * shrink);
+  const int half_side = std::clamp(static_cast<int>(spacing / 3), 2, 5 * shrink_to(gray, kSearchSide));
   const std::vector<bool> good =
-      refine_corners(gray, grid.corners, half_side, 0.25 * spacing + shrink, options.max_disagreement_px);
+      refine_corners(gray, grid.corners, half_side, 0.25 * spacing + 1, options.max_disagreement_px);
   for (std::size_t i = 0; i < grid.corners.size(); ++i) {
-    if (!good[i]) {
+    if (!good[i] ||
+        !among_neighbours(grid, good, static_cast<int>(i) % grid.columns, static_cast<int>(i) / grid.columns)) {
       ++out.corners_left_out;
       continue;
     }

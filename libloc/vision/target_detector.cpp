@@ -1,5 +1,7 @@
 #include "libloc/vision/target_detector.hpp"
 
+#include <Eigen/Cholesky>
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
 
 #include "libloc/core/check.hpp"
@@ -54,6 +56,27 @@ std::vector<bool> refine_corners(const cv::Mat& gray, std::vector<cv::Point2f>& 
     corner = narrow_end[k];
   }
   return good;
+}
+
+std::optional<cv::Point2d> smooth_place(std::span<const cv::Point2d> board, std::span<const cv::Point2d> pixels) {
+  if (board.size() < kFewestForSmooth) return std::nullopt;
+  Eigen::Matrix<double, 6, 2> solution;
+  for (int round = 0; round < 3; ++round) {
+    Eigen::Matrix<double, 6, 6> A = 1e-9 * Eigen::Matrix<double, 6, 6>::Identity();
+    Eigen::Matrix<double, 6, 2> b = Eigen::Matrix<double, 6, 2>::Zero();
+    for (std::size_t n = 0; n < board.size(); ++n) {
+      const cv::Point2d& p = board[n];
+      Eigen::Matrix<double, 6, 1> row;
+      row << 1, p.x, p.y, p.x * p.x, p.x * p.y, p.y * p.y;
+      const Eigen::RowVector2d pixel(pixels[n].x, pixels[n].y);
+      const double w = round == 0 ? 1 : 1 / (1 + (row.transpose() * solution - pixel).squaredNorm());
+      A += w * row * row.transpose();
+      b += w * row * pixel;
+    }
+    solution = A.ldlt().solve(b);
+  }
+  if (!solution.allFinite()) return std::nullopt;
+  return cv::Point2d(solution(0, 0), solution(0, 1));
 }
 
 }  // namespace vision

@@ -19,6 +19,11 @@ std::optional<double> brightness(const cv::Mat& gray, const cv::Point2f& at);
 std::vector<bool> refine_corners(const cv::Mat& gray, std::vector<cv::Point2f>& corners, int half_side,
                                  double max_way_px, double max_disagreement_px);
 
+inline constexpr std::size_t kFewestForSmooth = 10;
+/// Where the place (0, 0) of the board must be in the picture, from places around it: the polynomial of second order
+/// through them, those that do not fit outvoted. nullopt for fewer than kFewestForSmooth.
+std::optional<cv::Point2d> smooth_place(std::span<const cv::Point2d> board, std::span<const cv::Point2d> pixels);
+
 /// @param gray one channel, 8 bits
 TargetDetection find_checkerboard(const cv::Mat& gray, const CalibrationTarget& target,
                                   const TargetDetectorOptions& options);

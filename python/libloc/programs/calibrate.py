@@ -23,6 +23,7 @@ import numpy as np
 import libloc
 from libloc import DataError, Verdict
 from libloc.programs import (
+    calibrate_camera,
     calibrate_clock,
     calibrate_gps,
     calibrate_inertial,
@@ -131,6 +132,14 @@ def make_parser() -> argparse.ArgumentParser:
     gps.add_argument("input", type=Path, nargs="+", metavar="INPUT", help="LCM log")
     calibrate_gps.add_options(gps)
     _add_output_options(gps)
+    camera = _add_command(
+        commands,
+        "camera",
+        "focal lengths and distortion, from pictures of a checkerboard or an AprilGrid",
+        calibrate_camera.__doc__ or "",
+    )
+    calibrate_camera.add_options(camera)
+    _add_output_options(camera)
     return parser
 
 
@@ -174,6 +183,8 @@ def calibrated(options: argparse.Namespace) -> Outcome:
         return calibrate_clock.calibrate(options, _input_options(options))
     if options.command == "gps-latency":
         return calibrate_gps.calibrate(options)
+    if options.command == "camera":
+        return calibrate_camera.calibrate(options)
     return _COMMANDS[options.command][1](read_inputs(options), options)
 
 
@@ -211,6 +222,8 @@ def main(arguments: list[str] | None = None) -> int:
         calibrate_inertial.check_options(parser, options)
     elif options.command == "gps-latency":
         calibrate_gps.check_options(parser, options)
+    elif options.command == "camera":
+        calibrate_camera.check_options(parser, options)
     try:
         if options.out is not None and options.out.exists():
             libloc.read_rig(options.out)  # before the work, not after it
