@@ -40,4 +40,5 @@ install(FILES
   "${CMAKE_CURRENT_LIST_DIR}/FindGeographicLib.cmake" "${CMAKE_CURRENT_LIST_DIR}/FindLCM.cmake"
   "${CMAKE_CURRENT_LIST_DIR}/FindOpenBLAS.cmake"
   "${CMAKE_CURRENT_LIST_DIR}/FindMatio.cmake" "${CMAKE_CURRENT_LIST_DIR}/FindOpenCV.cmake"
+  "${CMAKE_CURRENT_LIST_DIR}/FindTurboJPEG.cmake"
   DESTINATION "${loc_package_dir}" COMPONENT development)

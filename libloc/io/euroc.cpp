@@ -1,9 +1,11 @@
 #include "libloc/io/euroc.hpp"
 
+#include <algorithm>
 #include <array>
 #include <optional>
 
 #include "libloc/core/check.hpp"
+#include "libloc/io/image_list.hpp"
 #include "libloc/io/table.hpp"
 
 namespace loc {
@@ -89,10 +91,6 @@ class EurocSource final : public MeasurementSource {
     fs::path mav = folder;
     if (fs::is_directory(io::status_of(folder / "mav0"))) mav = folder / "mav0";
     if (!fs::is_directory(io::status_of(mav))) throw DataError(folder.string() + ": no such folder");
-    const fs::path imu = mav / "imu0" / "data.csv";
-    if (!fs::exists(io::status_of(imu)))
-      throw DataError(imu.string() + ": no such file; an EuRoC recording has it in mav0/imu0");
-
     // In the order of equal times. EuRoC counts nanoseconds throughout, though not every heading says so.
     CsvOptions csv;
     csv.time_unit = "ns";
@@ -104,7 +102,12 @@ class EurocSource final : public MeasurementSource {
     open(1, options.read_gps, "gps0", StreamKind::kGps);
     open(2, options.read_odometry, "odometry0", StreamKind::kOdometry);
     open(3, options.read_reference, "state_groundtruth_estimate0", StreamKind::kReference);
-    streams_[4].emplace(imu, StreamKind::kImu, csv);
+    open(4, true, "imu0", StreamKind::kImu);
+    if (std::ranges::any_of(streams_, [](const auto& stream) { return stream.has_value(); })) return;
+    // Pictures alone are a recording, too; anything else is most likely the wrong folder.
+    if (!euroc_cameras(mav).empty()) return;
+    const fs::path imu = mav / "imu0" / "data.csv";
+    throw DataError(imu.string() + ": no such file, nor any other stream; an EuRoC recording has them in mav0");
   }
 
   std::optional<Measurement> next() override {
@@ -122,6 +125,7 @@ class EurocSource final : public MeasurementSource {
     for (const auto& stream : streams_) {
       if (stream) stream->add_counts(counts);
     }
+    if (!streams_[4]) counts.push_back({"imu.absent", 1});
     return counts;
   }
 

@@ -2,13 +2,13 @@
 
 #include <array>
 #include <cmath>
-#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 #include <vector>
 
 #include "libloc/core/check.hpp"
 #include "libloc/vision/image_view.hpp"
+#include "libloc/vision/opencv_log.hpp"
 
 namespace loc {
 namespace {
@@ -19,18 +19,6 @@ cv::Point fixed_point(const Eigen::Vector2d& pixel) {
   return {static_cast<int>(std::lround(pixel.x() * (1 << kShift))),
           static_cast<int>(std::lround(pixel.y() * (1 << kShift)))};
 }
-
-// OpenCV tells on the screen which encoders it tried.
-class Silence {
- public:
-  Silence() : before_(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)) {}
-  Silence(const Silence&) = delete;
-  Silence& operator=(const Silence&) = delete;
-  ~Silence() { cv::utils::logging::setLogLevel(before_); }
-
- private:
-  cv::utils::logging::LogLevel before_;
-};
 
 }  // namespace
 
@@ -102,7 +90,7 @@ VideoFile::VideoFile(const std::filesystem::path& path, int width, int height, d
   if (codecs.empty()) throw DataError(path.string() + ": a video is .mp4 or .avi");
   writer_->path = path;
   writer_->size = {width, height};
-  const Silence silence;
+  const OpenCvSilence silence;
   for (const std::string& codec : codecs) {
     const int fourcc = cv::VideoWriter::fourcc(codec[0], codec[1], codec[2], codec[3]);
     if (!writer_->writer.open(path.string(), cv::CAP_FFMPEG, fourcc, rate_hz, writer_->size)) continue;
@@ -128,7 +116,7 @@ void VideoFile::finish() {
   const std::string name = writer_->path.string();
   if (writer_->frames == 0) return;
   // The writer says nothing of a full disk or a broken encoder: see what the file says of itself, and that it begins.
-  const Silence silence;
+  const OpenCvSilence silence;
   cv::VideoCapture file(name, cv::CAP_FFMPEG);
   const auto frames = file.isOpened() && file.grab() ? std::llround(file.get(cv::CAP_PROP_FRAME_COUNT)) : 0;
   if (frames != writer_->frames) {

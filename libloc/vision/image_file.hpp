@@ -11,8 +11,9 @@ namespace loc {
 /// std::invalid_argument for an image whose data and size do not fit together.
 void write_image(const std::filesystem::path& path, const ImageMeasurement& image);
 
-/// @param format kGray or kBgr: what it is converted to. @throws DataError when there is no such file or it is no
-/// picture.
+/// @param format kGray or kBgr: what it is converted to. kMjpeg: a JPEG is given as it is stored, only its beginning
+/// and its end are looked at; another picture is decoded, grey or BGR as it is stored.
+/// @throws DataError naming the file when there is none or it is no picture, or a damaged one.
 ImageMeasurement read_image(const std::filesystem::path& path, PixelFormat format = PixelFormat::kGray);
 
 }  // namespace loc
