@@ -105,7 +105,8 @@ class GpsdSource final : public MeasurementSource {
       : options_((options.check(), std::move(options))),
         where_(parse_address(address.empty() ? "localhost" : address, DEFAULT_GPSD_PORT)),
         name_("gpsd " + where_.host + ":" + where_.port),
-        reconnection_(options_) {
+        reconnection_(gps_reconnection(options_)),
+        fixes_(options_) {
     connect();
   }
   ~GpsdSource() override { disconnect(); }
@@ -116,7 +117,7 @@ class GpsdSource final : public MeasurementSource {
 
   std::optional<Measurement> next() override {
     while (!stop_requested() && !reconnection_.stopped()) {
-      reconnection_.look_for_fix();
+      fixes_.look_for_fix();
       if (!connected_) {
         if (!reconnection_.wait()) break;
         try {
@@ -133,7 +134,7 @@ class GpsdSource final : public MeasurementSource {
         reconnection_.trouble(name_ + " tells no position or state: is a receiver attached (gpsd -N DEVICE, cgps)?");
       }
       if (options_.on_idle) options_.on_idle();
-      if (fix) reconnection_.heard(*fix);
+      if (fix) fixes_.heard(*fix);
       if (fix) return fix;
     }
     return std::nullopt;
@@ -267,6 +268,7 @@ class GpsdSource final : public MeasurementSource {
   HostAndPort where_;
   std::string name_;
   Reconnection reconnection_;
+  FixWatch fixes_;
   std::unique_ptr<gps_data_t> data_;
   bool connected_ = false;
   TimeNs last_fix_ns_ = 0;  // steady clock

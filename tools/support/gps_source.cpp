@@ -19,7 +19,6 @@ namespace {
 constexpr int kPollMs = 50;
 // The pause between two bursts, which a burst does not have: at 4800 baud a byte takes 2 ms.
 constexpr TimeNs kPause = 100'000'000;
-constexpr TimeNs kIdleStep = 100'000'000;
 constexpr double kLongestWaitS = 1e6;
 
 const char* name_of(GpsFixType type) {
@@ -47,7 +46,8 @@ class NmeaStreamSource final : public MeasurementSource {
   NmeaStreamSource(GpsConnection connection, LiveGpsOptions options)
       : options_((options.check(), std::move(options))),
         connection_(std::move(connection)),
-        reconnection_(options_),
+        reconnection_(gps_reconnection(options_)),
+        fixes_(options_),
         assembler_(options_.fix, options_.on_time_event) {
     connect();
   }
@@ -61,7 +61,7 @@ class NmeaStreamSource final : public MeasurementSource {
         waiting_.pop_front();
         return fix;
       }
-      reconnection_.look_for_fix();
+      fixes_.look_for_fix();
       if (!port_) {
         if (!reconnection_.wait()) break;
         try {
@@ -143,13 +143,14 @@ class NmeaStreamSource final : public MeasurementSource {
     if (!fix) return;
     fix->time_ns = fix->host_time_ns;
     fix->sequence = sequence_++;
-    reconnection_.heard(*fix);
+    fixes_.heard(*fix);
     waiting_.push_back(*fix);
   }
 
   LiveGpsOptions options_;
   GpsConnection connection_;
   Reconnection reconnection_;
+  FixWatch fixes_;
   NmeaReader reader_;
   NmeaFixAssembler assembler_;
   FileDescriptor port_;
@@ -170,33 +171,11 @@ void LiveGpsOptions::check() const {
   require(reconnect_s <= kLongestWaitS, "reconnect", reconnect_s, "must be at most 1e6 s");
 }
 
-void Reconnection::connected(const std::string& name) {
-  ++connections_;
-  log_info("event=gps_connected name=\"{}\" connections={}", name, connections_);
+Reconnection gps_reconnection(const LiveGpsOptions& options) {
+  return Reconnection("gps", {options.reconnect_s, options.on_idle, options.on_trouble});
 }
 
-void Reconnection::lost(const std::string& name, const std::string& why) {
-  ++losses_;
-  trouble(name + ": lost: " + why);
-}
-
-void Reconnection::failed(const std::string& why) {
-  ++failures_;
-  trouble(why);
-}
-
-void Reconnection::trouble(const std::string& why) {
-  if (why == trouble_) return;
-  if (why.empty()) {
-    log_info("event=gps_well");
-  } else {
-    log_warning("event=gps_trouble reason=\"{}\"", why);
-  }
-  trouble_ = why;
-  if (options_.on_trouble) options_.on_trouble(why);
-}
-
-void Reconnection::heard(const GpsMeasurement& fix) {
+void FixWatch::heard(const GpsMeasurement& fix) {
   if (fix.fix == GpsFixType::kNone) return;
   last_fix_ns_ = steady_now();
   if (fix_state_ == FixState::kFix) return;
@@ -207,28 +186,13 @@ void Reconnection::heard(const GpsMeasurement& fix) {
   log_info("event=gps_fix time={} satellites={} fix={}", time, satellites, name_of(fix.fix));
 }
 
-void Reconnection::look_for_fix() {
+void FixWatch::look_for_fix() {
   const TimeNs now = steady_now();
   if (last_fix_ns_ == kNoTime) last_fix_ns_ = now;
   if (fix_state_ == FixState::kNoFix || now - last_fix_ns_ < from_seconds(options_.silence_s)) return;
   const char* what = fix_state_ == FixState::kFix ? "lost" : "none so far";
   fix_state_ = FixState::kNoFix;
   log_warning("event=gps_no_fix state=\"{}\" for_s={:.1f}", what, to_seconds(now - last_fix_ns_));
-}
-
-bool Reconnection::wait() const {
-  const TimeNs end = steady_now() + from_seconds(options_.reconnect_s);
-  while (steady_now() < end && !stopped_) {
-    if (!sleep_for(std::min(kIdleStep, end - steady_now()))) return false;
-    if (options_.on_idle) options_.on_idle();
-  }
-  return !stop_requested() && !stopped_;
-}
-
-void Reconnection::add_to(NamedCounts& counts) const {
-  counts.push_back({"gps.connections", connections_});
-  if (losses_ > 0) counts.push_back({"gps.connections_lost", losses_});
-  if (failures_ > 0) counts.push_back({"gps.connections_failed", failures_});
 }
 
 namespace {

@@ -4,7 +4,6 @@
 // gps_time_ns; whoever knows the relation of the clocks puts one for the other.
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <memory>
 #include <string>
@@ -12,6 +11,7 @@
 #include "libloc/io/nmea_fix.hpp"
 #include "libloc/io/source.hpp"
 #include "tools/support/gps_connection.hpp"
+#include "tools/support/reconnection.hpp"
 
 namespace loc {
 
@@ -38,41 +38,25 @@ std::unique_ptr<MeasurementSource> open_nmea_stream(GpsConnection connection, Li
 /// were built without libgps.
 std::unique_ptr<MeasurementSource> open_gpsd(const std::string& address, LiveGpsOptions options);
 
-/// The state of a connection as it is told, its counts, and when to try again. Internal to the sources of this file.
-class Reconnection {
+/// Whether there is a fix, as it is told in the log. Internal to the sources of this file.
+class FixWatch {
  public:
-  explicit Reconnection(const LiveGpsOptions& options) : options_(options) {}
-
-  /// The connection stands; all is well when something has come through it. @param name of it
-  void connected(const std::string& name);
-  void lost(const std::string& name, const std::string& why);
-  void failed(const std::string& why);
-  /// Tells why, once until it changes; empty: all is well.
-  void trouble(const std::string& why);
-  /// Sleeps in small steps until the next attempt, calling on_idle. @return false when asked to stop.
-  bool wait() const;
-  void add_to(NamedCounts& counts) const;
+  explicit FixWatch(const LiveGpsOptions& options) : options_(options) {}
 
   /// What has come: tells the first fix, and the first after there was none.
   void heard(const GpsMeasurement& fix);
   /// Called now and then: tells once when there has been no fix for silence_s.
   void look_for_fix();
 
-  /// See MeasurementSource::stop().
-  void stop() { stopped_ = true; }
-  bool stopped() const { return stopped_; }
-
  private:
   enum class FixState { kNothingYet, kFix, kNoFix };
 
   const LiveGpsOptions& options_;
-  std::atomic<bool> stopped_ = false;
   FixState fix_state_ = FixState::kNothingYet;
   TimeNs last_fix_ns_ = kNoTime;  // monotonic; at first the first look
-  std::string trouble_;
-  std::int64_t connections_ = 0;
-  std::int64_t losses_ = 0;
-  std::int64_t failures_ = 0;
 };
+
+/// The state of a receiver's connection. Internal to the sources of this file.
+Reconnection gps_reconnection(const LiveGpsOptions& options);
 
 }  // namespace loc

@@ -26,8 +26,17 @@ bool holds_nmea(const std::string& path) {
 
 }  // namespace
 
-bool is_live(const std::string& source_kind) {
+bool is_receiver(const std::string& source_kind) {
   return source_kind == "gps-serial" || source_kind == "gps-tcp" || source_kind == "gpsd";
+}
+
+bool is_live(const std::string& source_kind) {
+  return is_receiver(source_kind) || source_kind == "camera";
+}
+
+bool needs_vision(const SourceSpec& spec) {
+  return spec.kind == "camera" || spec.kind == "video" || spec.kind == "images" ||
+         (spec.kind == "euroc" && spec.images.wanted);
 }
 
 std::string guess_source_kind(const std::string& path) {
@@ -45,12 +54,13 @@ std::unique_ptr<MeasurementSource> open_source(const SourceSpec& spec) {
   if (spec.kind == "gpsd") return open_gpsd(spec.path, spec.gps);
   std::error_code error;
   if (!std::filesystem::exists(spec.path, error)) throw UsageError("'" + spec.path + "' does not exist");
-  if (spec.kind == "euroc") return open_euroc(spec.path);
+  if (spec.kind == "euroc" && !spec.images.wanted) return open_euroc(spec.path);
   if (spec.kind == "csv") return open_csv(spec.path, spec.csv);
   if (spec.kind == "eqvio") return open_eqvio(spec.path, spec.eqvio);
   if (spec.kind == "broad") return open_broad(spec.path);
   if (spec.kind == "lcm-log") return open_lcm_log(spec.path, {.decode = spec.decode});
   if (spec.kind == "nmea") return open_nmea(spec.path, spec.gps.fix);
+  if (needs_vision(spec)) throw UsageError("source '" + spec.kind + "' is of loc-driver only");
   throw UsageError("source '" + spec.kind +
                    "' is not euroc, lcm-log, csv, eqvio, broad, nmea, gps-serial, gps-tcp or gpsd");
 }

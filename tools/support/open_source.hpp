@@ -9,21 +9,29 @@
 #include "libloc/io/source.hpp"
 #include "msgs/decode.hpp"
 #include "tools/support/gps_source.hpp"
+#include "tools/support/image_options.hpp"
 
 namespace loc {
 
 struct SourceSpec {
-  std::string kind;      ///< "euroc", "lcm-log", "csv", "eqvio", "broad", "nmea"; live: "gps-serial", "gps-tcp", "gpsd"
+  /// "euroc", "lcm-log", "csv", "eqvio", "broad", "nmea"; live: "gps-serial", "gps-tcp", "gpsd". With OpenCV (see
+  /// needs_vision): "video", "images"; live: "camera"
+  std::string kind;
   std::string path;      ///< file, folder, device, HOST:PORT
   CsvOptions csv;        ///< for csv
   EqvioOptions eqvio;    ///< for eqvio
   DecodeOptions decode;  ///< for lcm-log: channels
-  LiveGpsOptions gps;    ///< for nmea (gps.fix) and the live ones
+  LiveGpsOptions gps;    ///< for nmea (gps.fix) and the live ones; on_idle and on_trouble for camera, too
   int baud = 9600;       ///< for gps-serial
+  ImageSpec images;      ///< for euroc, video, images, camera
 };
 
 /// A kind that is a sensor connected now, not a recording.
 bool is_live(const std::string& source_kind);
+/// A live GPS receiver.
+bool is_receiver(const std::string& source_kind);
+/// A source that only open_source_with_images() opens (open_image_source.hpp).
+bool needs_vision(const SourceSpec& spec);
 
 /// Kind of a recording by its looks: a folder is euroc, *.csv eqvio by its heading, otherwise csv, *.mat broad, *.nmea
 /// nmea, another file that has NMEA sentences within its first 4 kB nmea, all else lcm-log.

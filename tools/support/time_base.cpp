@@ -68,7 +68,7 @@ std::unique_ptr<MeasurementSource> TimeBaseWiring::wrap(std::unique_ptr<Measurem
                                                         const std::string& lcm_url, const std::string& source_kind) {
   check(source_kind);
   RestampOptions options = restamp_options();
-  const bool receiver = is_live(source_kind);
+  const bool receiver = is_receiver(source_kind);
   if (source_kind == "nmea" || (options.base == TimeBase::kDevice && !receiver)) return source;
   if (receiver || options.base == TimeBase::kGps) {
     link_.emplace(lcm_url);
