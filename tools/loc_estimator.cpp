@@ -31,6 +31,7 @@ struct Arguments {
   std::string start = "auto";
   loc::SourceSpec input;
   std::string output;
+  loc::GeoOutputOptions geo;
 };
 
 loc::SourceSpec input_of(const Arguments& arguments, const loc::Rig& rig) {
@@ -72,7 +73,7 @@ int run_offline(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimat
   const loc::SourceSpec input = input_of(arguments, rig);
   loc::refuse_to_overwrite(input.path, arguments.output);
   const auto source = loc::open_source(input);
-  const auto output = loc::open_estimate_output(arguments.output, estimator.method(), estimator.world());
+  const auto output = loc::open_estimate_output(arguments.output, estimator.method(), estimator.world(), arguments.geo);
   std::int64_t estimates = 0;
   loc::EstimatorPipeline pipeline(std::move(estimator), rig, arguments.live.merger, [&](const loc::Estimate& estimate) {
     ++estimates;
@@ -165,8 +166,11 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"euroc", "lcm-log", "csv", "eqvio", "broad"}))
       ->needs(input);
   CLI::Option* output =
-      app.add_option("--output", arguments.output, "Off line: *.csv, *.tum, or *.lcm (an LCM log)")->needs(input);
+      app.add_option("--output", arguments.output,
+                     "Off line: *.csv, *.tum, *.lcm (an LCM log), or on the Earth *.gpx, *.kml, *.geojson")
+          ->needs(input);
   input->needs(output);
+  loc::add_geo_options(app, arguments.geo);
   app.add_option("--start", arguments.start,
                  "error-state, off line: auto (from the first second), reference (as the recording's reference says)")
       ->check(CLI::IsMember({"auto", "reference"}))

@@ -8,6 +8,7 @@ PYBIND11_MODULE(_core, m) {
   pybind11::register_exception<loc::DataError>(m, "DataError", PyExc_ValueError).doc() =
       "What is wrong in a file or message: where (file, line or byte), which field, which value.";
   locpy::bind_core(m);
+  locpy::bind_geo_export(m);
   locpy::bind_geometry(m);
   locpy::bind_sensors(m);
   locpy::bind_estimators(m);

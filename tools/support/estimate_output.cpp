@@ -138,12 +138,14 @@ class LogOutput : public EstimateOutput {
 }  // namespace
 
 std::unique_ptr<EstimateOutput> open_estimate_output(const std::string& path, const std::string& method,
-                                                     const std::string& world) {
+                                                     const std::string& world, const GeoOutputOptions& geo) {
   const std::string extension = std::filesystem::path(path).extension();
   if (extension == ".csv") return std::make_unique<CsvOutput>(path);
   if (extension == ".tum" || extension == ".txt") return std::make_unique<TumOutput>(path);
   if (extension == ".lcm" || extension == ".log") return std::make_unique<LogOutput>(path, method, world);
-  throw UsageError(path + ": what to write follows from the ending: .csv, .tum (or .txt), .lcm (or .log)");
+  if (is_geo_output(path)) return open_geo_output(path, "libloc " + method, geo);
+  throw UsageError(
+      path + ": what to write follows from the ending: .csv, .tum (or .txt), .lcm (or .log), .gpx, .kml, .geojson");
 }
 
 }  // namespace loc

@@ -1,4 +1,6 @@
-// Files that estimates go to off line. The kind follows from the name: *.csv, *.tum (or *.txt), *.lcm (or *.log).
+// Files that estimates go to off line. The kind follows from the name: *.csv, *.tum (or *.txt), *.lcm (or *.log),
+// *.gpx,
+// *.kml, *.geojson.
 #pragma once
 
 #include <memory>
@@ -7,6 +9,7 @@
 
 #include "libloc/estimators/estimate.hpp"
 #include "libloc/estimators/slam_frame.hpp"
+#include "tools/support/geo_output.hpp"
 
 namespace loc {
 
@@ -25,9 +28,9 @@ class EstimateOutput {
   virtual void finish() = 0;
 };
 
-/// @param method, world as in estimate_t
+/// @param method, world as in estimate_t @param geo for *.gpx, *.kml, *.geojson
 /// @throws UsageError for another ending, DataError when the file cannot be written.
 std::unique_ptr<EstimateOutput> open_estimate_output(const std::string& path, const std::string& method,
-                                                     const std::string& world);
+                                                     const std::string& world, const GeoOutputOptions& geo = {});
 
 }  // namespace loc
