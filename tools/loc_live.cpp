@@ -22,12 +22,12 @@ int main(int argc, char** argv) {
                        "Runs driver, estimator and logger as processes of their own, watches them and stops them in "
                        "order at the end of the recording or on Ctrl-C.");
   CLI::App& app = program.app();
-  app.add_option(
-         "SOURCE", kind,
-         "Recordings: euroc, lcm-log, csv, eqvio, broad, nmea, video, images; live: gps-serial, gps-tcp, gpsd, camera")
+  app.add_option("SOURCE", kind,
+                 "Recordings: euroc, lcm-log, csv, eqvio, broad, nmea, video, images, rawlog; live: gps-serial, "
+                 "gps-tcp, gpsd, camera")
       ->required()
-      ->check(CLI::IsMember({"euroc", "lcm-log", "csv", "eqvio", "broad", "nmea", "video", "images", "gps-serial",
-                             "gps-tcp", "gpsd", "camera"}));
+      ->check(CLI::IsMember({"euroc", "lcm-log", "csv", "eqvio", "broad", "nmea", "video", "images", "rawlog",
+                             "gps-serial", "gps-tcp", "gpsd", "camera"}));
   app.add_option("PATH", path, "The recording; live: device, HOST:PORT")->required();
   app.add_option("--transport", transport,
                  "auto: multicast where it works, otherwise (and to log at full speed) a hub of its own; udpm; hub")

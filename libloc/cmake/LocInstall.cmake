@@ -15,7 +15,7 @@ install(TARGETS ${loc_install_targets} EXPORT liblocTargets
 install(EXPORT liblocTargets NAMESPACE libloc:: DESTINATION "${loc_package_dir}" COMPONENT development)
 
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/libloc" "${PROJECT_SOURCE_DIR}/msgs" DESTINATION "${loc_include_dir}"
-  COMPONENT development FILES_MATCHING PATTERN "*.hpp" PATTERN "cmake" EXCLUDE)
+  COMPONENT development FILES_MATCHING PATTERN "*.hpp" PATTERN "cmake" EXCLUDE PATTERN "rawlog.hpp" EXCLUDE)
 # The generated message types; those of other packages are used inside the library only.
 install(DIRECTORY "${PROJECT_BINARY_DIR}/msgs/generated/loc" DESTINATION "${loc_include_dir}" COMPONENT development)
 # For programs in other languages, and for the stock LCM tools.

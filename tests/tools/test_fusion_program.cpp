@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "libloc/core/gps_time.hpp"
 #include "libloc/geometry/so3.hpp"
 #include "libloc/io/lcm_log.hpp"
 #include "libloc/io/tum.hpp"
@@ -121,6 +122,36 @@ TEST_F(FusionProgram, DriveFromCsvToTrajectoryScaleAndOrigin) {
   std::getline(csv, heading);
   EXPECT_TRUE(heading.ends_with("scale,sigma_scale,origin_latitude_rad,origin_longitude_rad,origin_altitude_m"));
   EXPECT_NE(heading.find("sigma_pz_m"), std::string::npos);
+}
+
+TEST_F(FusionProgram, APathOnTheEarthForMaps) {
+  write_drive(path("r.csv"), 20);
+  ASSERT_EQ(estimate({"--output", path("e.gpx"), "--geo-times", "gps"}), 0) << errors();
+  const std::string gpx = text_of(path("e.gpx"));
+  std::vector<double> latitudes;
+  double longitude = 0;
+  for (std::size_t at = gpx.find("<trkpt"); at != std::string::npos; at = gpx.find("<trkpt", at + 1)) {
+    double latitude = 0;
+    ASSERT_EQ(std::sscanf(gpx.c_str() + at, "<trkpt lat=\"%lf\" lon=\"%lf\"", &latitude, &longitude), 2);
+    latitudes.push_back(latitude);
+  }
+  // Ten a second from the moment on at which the world is tied to the Earth.
+  EXPECT_GT(latitudes.size(), 100U);
+  EXPECT_LE(latitudes.size(), 201U);
+  const DrivenCircle motion = car();
+  const GeodeticPoint truth = kWorld.to_geodetic(motion.at(20).T_world_body.translation);
+  EXPECT_NEAR(latitudes.back() / 180 * M_PI, truth.latitude, 4 / 6.4e6);
+  EXPECT_NEAR(longitude / 180 * M_PI, truth.longitude, 4 / 4.2e6);
+  EXPECT_NE(gpx.find("<loc:sigma_horizontal>"), std::string::npos);
+  const std::string time = to_text(utc_from_gps(motion.time(20))).substr(0, 16);
+  EXPECT_NE(gpx.find("<time>" + time.substr(0, 10)), std::string::npos) << time;
+  ASSERT_EQ(estimate({"--output", path("e.geojson"), "--geo-rate-hz", "1"}), 0) << errors();
+  EXPECT_NE(text_of(path("e.geojson")).find("\"LineString\""), std::string::npos);
+  EXPECT_LT(text_of(path("e.geojson")).size(), gpx.size() / 5);
+
+  EXPECT_EQ(estimate({"--output", path("none.kml"), "--no-gps"}), 1);
+  EXPECT_NE(errors().find("tied to the Earth"), std::string::npos) << errors();
+  EXPECT_FALSE(std::filesystem::exists(path("none.kml")));
 }
 
 TEST_F(FusionProgram, PresetsOfTheExampleStartFromTheReference) {

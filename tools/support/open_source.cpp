@@ -60,7 +60,7 @@ std::unique_ptr<MeasurementSource> open_source(const SourceSpec& spec) {
   if (spec.kind == "broad") return open_broad(spec.path);
   if (spec.kind == "lcm-log") return open_lcm_log(spec.path, {.decode = spec.decode});
   if (spec.kind == "nmea") return open_nmea(spec.path, spec.gps.fix);
-  if (needs_vision(spec)) throw UsageError("source '" + spec.kind + "' is of loc-driver only");
+  if (needs_vision(spec) || spec.kind == kRawlog) throw UsageError("source '" + spec.kind + "' is of loc-driver only");
   throw UsageError("source '" + spec.kind +
                    "' is not euroc, lcm-log, csv, eqvio, broad, nmea, gps-serial, gps-tcp or gpsd");
 }

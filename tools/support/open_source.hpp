@@ -13,9 +13,11 @@
 
 namespace loc {
 
+inline constexpr const char* kRawlog = "rawlog";
+
 struct SourceSpec {
   /// "euroc", "lcm-log", "csv", "eqvio", "broad", "nmea"; live: "gps-serial", "gps-tcp", "gpsd". With OpenCV (see
-  /// needs_vision): "video", "images"; live: "camera"
+  /// needs_vision): "video", "images"; live: "camera". With MRPT (io/rawlog.hpp): "rawlog"
   std::string kind;
   std::string path;      ///< file, folder, device, HOST:PORT
   CsvOptions csv;        ///< for csv
