@@ -1,9 +1,16 @@
 // loc-estimator: measurements in, estimates out; on LCM, or off line from a recording to a file, through the same code.
+// Built without OpenCV as loc-estimator, with it as loc-estimator-images, which the first becomes when pictures are
+// wanted.
+
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
+#include <system_error>
 
 #include "tools/support/any_estimator.hpp"
 #include "tools/support/channels.hpp"
+#include "tools/support/child_process.hpp"
 #include "tools/support/estimate_output.hpp"
 #include "tools/support/fusion_options.hpp"
 #include "tools/support/live_estimator.hpp"
@@ -13,8 +20,48 @@
 #include "tools/support/program.hpp"
 #include "tools/support/rig_option.hpp"
 #include "tools/support/slam_options.hpp"
+#ifdef LOC_HAVE_VISION
+#include "libloc/vision/image_slam.hpp"
+#include "tools/support/open_image_source.hpp"
+#endif
 
 namespace {
+
+#ifdef LOC_HAVE_VISION
+std::unique_ptr<loc::MeasurementSource> open(const loc::SourceSpec& source) {
+  return loc::open_source_with_images(source);
+}
+
+loc::SlamOptions options_for_images(const loc::SlamOptions& options) {
+  return loc::slam_options_for_images(options);
+}
+
+void become_program_with_images(char** /*argv*/) {}
+
+void set_front_end(loc::AnyEstimator& estimator, const loc::CameraCalibration& camera) {
+  estimator.set_front_end(loc::make_picture_front_end(camera));
+}
+#else
+std::unique_ptr<loc::MeasurementSource> open(const loc::SourceSpec& source) {
+  return loc::open_source(source);
+}
+
+loc::SlamOptions options_for_images(const loc::SlamOptions& options) {
+  return options;
+}
+
+void become_program_with_images(char** argv) {
+  const std::string program = loc::own_folder() + "/loc-estimator-images";
+  ::execv(program.c_str(), argv);
+  const int number = errno;
+  if (number != ENOENT) throw std::runtime_error(program + ": " + std::generic_category().message(number));
+  throw loc::UsageError(
+      "--images needs OpenCV, and libloc was built without it (Debian: libopencv-videoio-dev libopencv-video-dev "
+      "libopencv-calib3d-dev libturbojpeg0-dev)");
+}
+
+void set_front_end(loc::AnyEstimator& /*estimator*/, const loc::CameraCalibration& /*camera*/) {}
+#endif
 
 struct Arguments {
   loc::LiveEstimatorOptions live;
@@ -38,6 +85,7 @@ loc::SourceSpec input_of(const Arguments& arguments, const loc::Rig& rig) {
   loc::SourceSpec input = arguments.input;
   if (input.kind.empty()) input.kind = loc::guess_source_kind(input.path);
   input.decode.channels = arguments.live.channels;
+  input.images.wanted = arguments.slam.images;
   // Pixels of a recording that has none are those of a camera: of the user's, where there is one.
   if (!rig.cameras.empty()) input.eqvio.camera = rig.cameras.front();
   return input;
@@ -57,13 +105,16 @@ loc::EstimatorSettings settings_of(const Arguments& arguments, const loc::Rig& r
     throw loc::UsageError("--world " + arguments.world + ": " + arguments.method + " estimates in ENU only");
   }
   if (loc::is_slam(arguments.method)) {
-    settings.slam = loc::slam_options(arguments.slam, arguments.method, rig);
+    loc::SlamOptions usual;
+    usual.motion = loc::slam_motion(arguments.method);
+    if (arguments.slam.images) usual = options_for_images(usual);
+    settings.slam = loc::slam_options(arguments.slam, arguments.method, rig, usual);
     settings.slam_start = loc::slam_start(arguments.slam, settings.slam);
     return settings;
   }
   settings.fusion = loc::fusion_options(arguments.fusion, arguments.preset, rig);
   if (arguments.start == "reference") {
-    const auto source = loc::open_source(input_of(arguments, rig));
+    const auto source = open(input_of(arguments, rig));
     settings.fusion.given_start = loc::start_from_reference(*source, settings.fusion, arguments.preset);
   }
   return settings;
@@ -72,7 +123,7 @@ loc::EstimatorSettings settings_of(const Arguments& arguments, const loc::Rig& r
 int run_offline(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimator estimator) {
   const loc::SourceSpec input = input_of(arguments, rig);
   loc::refuse_to_overwrite(input.path, arguments.output);
-  const auto source = loc::open_source(input);
+  const auto source = open(input);
   const auto output = loc::open_estimate_output(arguments.output, estimator.method(), estimator.world(), arguments.geo);
   std::int64_t estimates = 0;
   loc::EstimatorPipeline pipeline(std::move(estimator), rig, arguments.live.merger, [&](const loc::Estimate& estimate) {
@@ -177,6 +228,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
 
   return program.run(argc, argv, [&] {
+    if (arguments.slam.images) become_program_with_images(argv);
     arguments.live.channels = loc::parse_channels(arguments.channels);
     arguments.live.merger.max_delay_ns = loc::from_seconds(arguments.reorder_delay_ms * 1e-3);
     if (arguments.start == "reference" && (input->count() == 0 || arguments.method != "error-state")) {
@@ -184,20 +236,25 @@ int main(int argc, char** argv) {
     }
     loc::Rig rig = loc::load_rig(arguments.config);
     if (!loc::is_slam(arguments.method)) {
-      for (const CLI::Option* option : {arguments.slam.config_option, arguments.slam.map_in_option,
-                                        arguments.slam.map_out_option, arguments.slam.camera_option}) {
+      for (const CLI::Option* option :
+           {arguments.slam.config_option, arguments.slam.map_in_option, arguments.slam.map_out_option,
+            arguments.slam.camera_option, arguments.slam.images_option}) {
         if (option->count() > 0) {
           throw loc::UsageError(option->get_name() + ": for --method mono-slam and inertial-slam only");
         }
       }
     } else if (input->count() > 0 && rig.cameras.empty()) {
       // An explicit --config wins over what the recording says.
-      rig.cameras = loc::rig_of_source(input_of(arguments, rig)).cameras;
+      const loc::Rig of_recording = loc::rig_of_source(input_of(arguments, rig));
+      rig.cameras = of_recording.cameras;
+      if (!rig.imu) rig.imu = of_recording.imu;
     }
     if (input->count() > 0 && !arguments.slam.map_out.empty()) {
       loc::refuse_to_overwrite(arguments.input.path, arguments.slam.map_out);
     }
-    loc::AnyEstimator estimator = loc::make_estimator(settings_of(arguments, rig, beta->count() > 0));
+    const loc::EstimatorSettings settings = settings_of(arguments, rig, beta->count() > 0);
+    loc::AnyEstimator estimator = loc::make_estimator(settings);
+    if (arguments.slam.images) set_front_end(estimator, settings.slam.camera);
     return input->count() > 0 ? run_offline(arguments, rig, std::move(estimator))
                               : run_live(arguments, rig, std::move(estimator));
   });

@@ -85,8 +85,42 @@ bool AnyEstimator::takes_late(StreamKind kind) const {
          (kind == StreamKind::kGps || kind == StreamKind::kOdometry);
 }
 
+void AnyEstimator::set_front_end(std::unique_ptr<PictureFrontEnd> front_end) {
+  require(std::holds_alternative<MonoSlam>(implementation_) || std::holds_alternative<InertialSlam>(implementation_),
+          "method '" + method_ + "' has no use for pictures");
+  front_end_ = std::move(front_end);
+  inputs_ = {StreamKind::kImu, StreamKind::kImage};
+}
+
+template <class Slam>
+bool AnyEstimator::process_with_pictures(Slam& slam, const Measurement& measurement) {
+  const auto* image = std::get_if<ImageMeasurement>(&measurement);
+  bool is_new = false;
+  if (image == nullptr) {
+    is_new = slam.process(measurement);
+  } else if (image->camera == slam.options().camera_index) {
+    slam.predict_frame(image->time_ns, expected_);
+    const FeaturesMeasurement* features = front_end_->track(*image, expected_);
+    if (features == nullptr) return false;
+    features_ = *features;
+    is_new = slam.process(features_);
+  }
+  gave_estimate_ = is_new;
+  for (const SlamFrame& frame : slam_frames()) front_end_->learn(frame);
+  return is_new;
+}
+
 bool AnyEstimator::process(const Measurement& measurement) {
-  gave_estimate_ = std::visit([&](auto& estimator) { return estimator.process(measurement); }, implementation_);
+  gave_estimate_ = false;
+  auto* mono = std::get_if<MonoSlam>(&implementation_);
+  auto* inertial = std::get_if<InertialSlam>(&implementation_);
+  if (front_end_ != nullptr && mono != nullptr) {
+    gave_estimate_ = process_with_pictures(*mono, measurement);
+  } else if (front_end_ != nullptr && inertial != nullptr) {
+    gave_estimate_ = process_with_pictures(*inertial, measurement);
+  } else {
+    gave_estimate_ = std::visit([&](auto& estimator) { return estimator.process(measurement); }, implementation_);
+  }
   return gave_estimate_;
 }
 
@@ -102,12 +136,17 @@ Estimate AnyEstimator::estimate() const {
 }
 
 NamedCounts AnyEstimator::counts() const {
-  return std::visit([](const auto& estimator) { return estimator.counts(); }, implementation_);
+  NamedCounts out = std::visit([](const auto& estimator) { return estimator.counts(); }, implementation_);
+  if (front_end_ != nullptr) {
+    for (NamedCount& count : front_end_->counts()) out.push_back(std::move(count));
+  }
+  return out;
 }
 
 void AnyEstimator::reset() {
   std::visit([](auto& estimator) { estimator.reset(); }, implementation_);
   gave_estimate_ = false;
+  if (front_end_ != nullptr) front_end_->reset();
   restore();
 }
 

@@ -2,6 +2,7 @@
 // entry of the table in any_estimator.cpp and its own options in EstimatorSettings.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -13,6 +14,7 @@
 #include "libloc/estimators/inertial_slam.hpp"
 #include "libloc/estimators/madgwick.hpp"
 #include "libloc/estimators/mono_slam.hpp"
+#include "tools/support/picture_front_end.hpp"
 
 namespace loc {
 
@@ -35,6 +37,10 @@ class AnyEstimator {
   /// @param start for SLAM: a state to go on from @throws std::invalid_argument when it does not fit
   AnyEstimator(std::string method, std::string world, std::vector<StreamKind> inputs, Implementation implementation,
                std::optional<SlamSnapshot> start = {});
+
+  /// SLAM: features are found in the camera's pictures, and tracks that come are left aside.
+  /// @throws std::invalid_argument for another method.
+  void set_front_end(std::unique_ptr<PictureFrontEnd> front_end);
 
   const std::string& method() const { return method_; }
   const std::string& world() const { return world_; }
@@ -61,12 +67,17 @@ class AnyEstimator {
 
  private:
   void restore();
+  template <class Slam>
+  bool process_with_pictures(Slam& slam, const Measurement& measurement);
 
   std::string method_;
   std::string world_;
   std::vector<StreamKind> inputs_;
   Implementation implementation_;
   std::optional<SlamSnapshot> start_;
+  std::unique_ptr<PictureFrontEnd> front_end_;
+  SlamPrediction expected_;
+  Measurement features_ = FeaturesMeasurement{};
   bool gave_estimate_ = false;  // the last process()
 };
 static_assert(Estimator<AnyEstimator>);

@@ -8,6 +8,7 @@
 #include "libloc/io/broad.hpp"
 #include "libloc/io/euroc.hpp"
 #include "libloc/io/nmea_source.hpp"
+#include "libloc/io/rig_yaml.hpp"
 #include "msgs/lcm_log_source.hpp"
 #include "tools/support/program.hpp"
 
@@ -66,8 +67,19 @@ std::unique_ptr<MeasurementSource> open_source(const SourceSpec& spec) {
 }
 
 Rig rig_of_source(const SourceSpec& spec) {
-  if (spec.kind != "eqvio") return {};
-  return open_eqvio(spec.path, spec.eqvio)->rig();
+  if (spec.kind == "eqvio") return open_eqvio(spec.path, spec.eqvio)->rig();
+  Rig rig;
+  if (spec.kind != "euroc") return rig;
+  const std::filesystem::path folder = spec.path;
+  const auto sensor = [&](const std::string& name) {
+    const std::filesystem::path below = folder / "mav0" / name / "sensor.yaml";
+    return std::filesystem::exists(below) ? below : folder / name / "sensor.yaml";
+  };
+  for (int i = 0; std::filesystem::exists(sensor("cam" + std::to_string(i))); ++i) {
+    rig.cameras.push_back(read_euroc_camera(sensor("cam" + std::to_string(i))));
+  }
+  if (std::filesystem::exists(sensor("imu0"))) rig.imu = read_euroc_imu(sensor("imu0"));
+  return rig;
 }
 
 void refuse_to_overwrite(const std::string& recording, const std::string& output) {

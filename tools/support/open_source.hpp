@@ -43,7 +43,8 @@ std::string guess_source_kind(const std::string& path);
 /// GpsConnectionError when a live source cannot be reached.
 std::unique_ptr<MeasurementSource> open_source(const SourceSpec& spec);
 
-/// The rig that a recording brings along: eqvio's camera, unless spec.eqvio has one; empty for all other kinds.
+/// The rig that a recording brings along: eqvio's camera, unless spec.eqvio has one; cameras and IMU of euroc, as far
+/// as their sensor.yaml are there; empty for all other kinds.
 /// @throws as open_source.
 Rig rig_of_source(const SourceSpec& spec);
 

@@ -47,15 +47,21 @@ void add_slam_options(CLI::App& app, SlamArguments& arguments) {
       "--map-out", arguments.map_out, "SLAM: at the end, save map and state to go on from; *.ply: points, for viewers");
   arguments.camera_option =
       app.add_option("--camera", arguments.camera, "SLAM: index in the rig of the camera")->check(CLI::Range(0, 1000));
+  arguments.images_option = app.add_flag("--images", arguments.images,
+                                         "SLAM: features are found in the camera's pictures; tracks are left aside");
 }
 
 bool is_slam(const std::string& method) {
   return method == kMono || method == kInertial;
 }
 
-SlamOptions slam_options(const SlamArguments& arguments, const std::string& method, const Rig& rig) {
-  SlamOptions options;
-  const SlamMotion motion = method == kInertial ? SlamMotion::kInertial : SlamMotion::kConstantVelocity;
+SlamMotion slam_motion(const std::string& method) {
+  return method == kInertial ? SlamMotion::kInertial : SlamMotion::kConstantVelocity;
+}
+
+SlamOptions slam_options(const SlamArguments& arguments, const std::string& method, const Rig& rig,
+                         SlamOptions options) {
+  const SlamMotion motion = slam_motion(method);
   options.motion = motion;
   if (rig.imu && !rig.imu->noise_measured.empty()) options.imu_noise = rig.imu->noise;
   if (!arguments.config.empty()) {
