@@ -182,8 +182,9 @@ void SlamFilter::add_landmarks(const FeaturesMeasurement& frame) {
     const auto place = [](double at, int size, int cells) {
       return std::clamp(static_cast<int>((at + 0.5) / size * cells), 0, cells - 1);
     };
-    return static_cast<std::size_t>(place(pixel.y(), camera_.height_px(), map.grid_rows) * map.grid_columns +
-                                    place(pixel.x(), camera_.width_px(), map.grid_columns));
+    const auto row = static_cast<std::size_t>(place(pixel.y(), camera_.height_px(), map.grid_rows));
+    const auto column = static_cast<std::size_t>(place(pixel.x(), camera_.width_px(), map.grid_columns));
+    return row * static_cast<std::size_t>(map.grid_columns) + column;
   };
   std::fill(cells_.begin(), cells_.end(), 0);
   for (const SlamLandmark& landmark : landmarks_) {
