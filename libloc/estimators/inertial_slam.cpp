@@ -13,6 +13,7 @@ namespace {
 constexpr int kSetBackAfter = 20;          // samples in a row on an earlier time line
 constexpr std::size_t kMostWaiting = 256;  // frames without an IMU sample after them
 constexpr int kTryEvery = 5;               // frames from one try of a start in motion to the next
+constexpr double kShortestWait = 0.25;     // for the next one, when it was hopeless [s]
 constexpr double kVibrationTime = 0.1;     // over which shaking is averaged [s]
 constexpr double kLongestHold = 0.5;       // of samples for frames [s]
 constexpr double kFarthestAhead = 10;      // of the IMU: a frame is on another clock [s]
@@ -104,6 +105,8 @@ void InertialSlam::forget_early() {
   early_.clear();
   picture_rest_.reset();
   at_rest_ = false;
+  try_wait_s_ = 0;
+  try_after_ns_ = kNoTime;
 }
 
 void InertialSlam::restore(const SlamSnapshot& snapshot) {
@@ -262,7 +265,7 @@ bool InertialSlam::look_for_start() {
     }
     start_.reset();
   }
-  if (early_frames_ >= kTryEvery) {
+  if (early_frames_ >= kTryEvery && last_imu_.time_ns >= try_after_ns_) {
     early_frames_ = 0;
     if (start_moving()) return true;
   }
@@ -282,7 +285,17 @@ bool InertialSlam::look_for_start() {
 bool InertialSlam::start_moving() {
   const auto found = moving_start_.solve();
   if (!found) {
-    ++counts_[std::string("starts.refused.") + slam_start_outcome_name(moving_start_.outcome())];
+    const SlamStartOutcome outcome = moving_start_.outcome();
+    ++counts_[std::string("starts.refused.") + slam_start_outcome_name(outcome)];
+    // Tracks of which most is wrong cost all attempts that there are, a second perhaps: what follows must not wait for
+    // them ever longer.
+    const bool hopeless = outcome == SlamStartOutcome::kResidual || outcome == SlamStartOutcome::kNoSolution;
+    if (hopeless) {
+      try_wait_s_ = std::min(std::max(2 * try_wait_s_, kShortestWait), options().moving_start.max_duration_s);
+    } else if (outcome != SlamStartOutcome::kFewFeatures) {
+      try_wait_s_ = 0;
+    }
+    try_after_ns_ = last_imu_.time_ns + from_seconds(try_wait_s_);
     return false;
   }
   // The filter uses the same measurements again: the solution tells where to linearise, and little more. The
@@ -344,6 +357,8 @@ void InertialSlam::begin(TimeNs time_ns, const InertialState& from,
     covariance.block<3, 3>(kTheta, kTheta) += square(o.sigma_orientation) * up * up.transpose();
   }
   ++counts_[count];
+  try_wait_s_ = 0;
+  try_after_ns_ = kNoTime;
   filter_.start(time_ns, state, covariance);
   frame_status_ = 0;
   last_good_frame_ns_ = time_ns;

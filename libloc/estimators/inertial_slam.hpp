@@ -119,6 +119,8 @@ class InertialSlam {
   Fifo<FeaturesMeasurement> waiting_;   // frames, for the IMU
   std::vector<ImuMeasurement> early_;   // samples, for the start
   int early_frames_ = 0;                // since a start was last tried
+  double try_wait_s_ = 0;               // after which a start is tried again
+  TimeNs try_after_ns_ = kNoTime;       // the same, as a time
   ImuMeasurement last_imu_;             // as the filter's state is; its rate and force at the filter's time
   Stamp last_;                          // of the sample that the estimate is for
   TimeNs newest_ns_ = kNoTime;          // sample received

@@ -379,6 +379,42 @@ TEST(SlamFaults, ResetIsAFreshObject) {
   compare(InertialSlam(inertial), InertialSlam(inertial), restore, standing);
 }
 
+// Tracks that are mostly wrong cost a start all attempts that there are: they are not made again and again, or a live
+// program would fall behind. When the tracks are right it starts.
+TEST(SlamFaults, HopelessStartsAreTriedLessOften) {
+  SlamOptions options = ride_options(SlamMotion::kInertial);
+  options.moving_start.max_frames = options.moving_start.min_frames = 10;  // cheaper
+  options.moving_start.max_features = 24;
+  options.moving_start.min_features = 6;
+  InertialSlam slam(options);
+  SlamRideOptions moving;
+  moving.rest_s = -3;
+  SlamRide world(moving);
+  Random random(4);
+  constexpr double kUntil = 3.5;
+  double running_since = 0;
+  std::int64_t tried = 0;
+  world.run(7.5, [&](Measurement measurement) {
+    const double t = seconds_of(measurement);
+    if (auto* frame = std::get_if<FeaturesMeasurement>(&measurement); frame != nullptr && t < kUntil) {
+      for (FeatureObservation& feature : frame->features) {
+        if (random.uniform() < 0.5) feature.pixel_px = {random.uniform(0, 639), random.uniform(0, 479)};
+      }
+    }
+    if (slam.running()) return;
+    slam.process(measurement);
+    if (t < kUntil) {
+      tried =
+          count_of(slam.counts(), "starts.refused.residual") + count_of(slam.counts(), "starts.refused.no-solution");
+    }
+    if (slam.running()) running_since = t;
+  });
+  EXPECT_GE(tried, 3);
+  EXPECT_LE(tried, 5) << "every five frames it would be 8";
+  EXPECT_GT(running_since, kUntil);
+  EXPECT_LT(running_since, kUntil + 4);
+}
+
 // The end of a recording: frames that wait for a sample after them are taken when it would not change what they say.
 TEST(SlamFaults, TheEndTakesTheFramesThatWait) {
   const SlamOptions options = ride_options(SlamMotion::kInertial);
