@@ -169,6 +169,52 @@ void compare(const Problem& problem, const CameraFitOptions& options, CameraFit&
   fit.other_model_rms_px = std::sqrt(2 * result.cost / static_cast<double>(other.used_corners()));
 }
 
+// A grid whose space between tags is not as it was given is the usual reason for large residuals: the space that fits
+// best, if it halves them. Golden-section search (Kiefer 1953) over the logarithm, on some of the pictures.
+std::optional<double> better_spacing(const CalibrationTarget& target, const Problem& problem) {
+  constexpr std::size_t kEnough = 20;
+  std::vector<BundleView> some;
+  const std::size_t count = std::min(kEnough, problem.views.size());
+  for (std::size_t i = 0; i < count; ++i) some.push_back(problem.views[i * problem.views.size() / count]);
+  const auto cost = [&](double log_spacing) {
+    CalibrationTarget other = target;
+    other.spacing = std::exp(log_spacing);
+    CameraCalibration camera = problem.camera;
+    std::vector<BundleView> views = some;
+    for (BundleView& view : views) {
+      for (BundleCorner& corner : view.corners) corner.point = other.corner(corner.id);
+    }
+    const auto result = adjust(camera, views, {.huber_px = 0.5, .max_iterations = 15, .fixed_camera = false});
+    return result.valid ? result.cost : std::numeric_limits<double>::infinity();
+  };
+  const double given = std::log(target.spacing);
+  const double ratio = (std::sqrt(5.0) - 1) / 2;
+  double low = given - std::log(3.0);
+  double high = given + std::log(3.0);
+  double left = high - ratio * (high - low);
+  double right = low + ratio * (high - low);
+  double left_cost = cost(left);
+  double right_cost = cost(right);
+  while (high - low > 0.004) {
+    if (left_cost < right_cost) {
+      high = right;
+      right = left;
+      right_cost = left_cost;
+      left = high - ratio * (high - low);
+      left_cost = cost(left);
+    } else {
+      low = left;
+      left = right;
+      left_cost = right_cost;
+      right = low + ratio * (high - low);
+      right_cost = cost(right);
+    }
+  }
+  const double best = (low + high) / 2;
+  // Huber's cost grows linearly with large residuals.
+  return cost(best) < 0.5 * cost(given) ? std::optional(std::exp(best)) : std::nullopt;
+}
+
 void find_covariance(const Problem& problem, CameraFit& fit) {
   const auto information = calib::information_of(problem.camera, problem.views);
   const int n = calib::parameter_count(problem.camera.distortion_model);
@@ -184,7 +230,7 @@ void find_covariance(const Problem& problem, CameraFit& fit) {
   if (information.pulls.size() < kViewsForScatter) return;
   Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(n, n);
   for (const Vector8d& pull : information.pulls) scatter += pull.head(n) * pull.head(n).transpose();
-  const double m = static_cast<double>(information.pulls.size());
+  const auto m = static_cast<double>(information.pulls.size());
   const Eigen::MatrixXd sandwich = *inverse * scatter * *inverse * (m / (m - n));
   fit.sigma_by_views.setZero();
   fit.sigma_by_views.head(n) = sandwich.diagonal().cwiseSqrt();
@@ -307,6 +353,14 @@ CameraFit calibrate_camera(const CalibrationTarget& target, std::span<const Targ
   }
   find_covariance(problem, fit);
   if (options.compare_models && options.model != DistortionModel::kNone) compare(problem, options, fit);
+  constexpr double kSuspicious = 0.5;  // [px]
+  if (target.kind == TargetKind::kAprilGrid && fit.noise_px > kSuspicious) {
+    if (const auto spacing = better_spacing(target, problem)) {
+      fit.quality.lower_to(Verdict::kRefused, "The corners fit a spacing of " + to_text(*spacing, 3) +
+                                                  " far better than the target's " + to_text(target.spacing, 3) +
+                                                  ": measure the space between two tags again, as a share of a tag.");
+    }
+  }
   calib::judge(fit);
   return fit;
 }
@@ -335,7 +389,7 @@ std::vector<std::size_t> choose_views(const CalibrationTarget& target, std::span
     const Eigen::Matrix<double, 3, 2> map = A.ldlt().solve(b);
     if (!map.allFinite()) continue;
     able.push_back(i);
-    looks.push_back(Eigen::Map<const Vector6>(map.data()));
+    looks.emplace_back(Eigen::Map<const Vector6>(map.data()));
   }
   if (able.size() <= count) return able;
   std::vector<std::size_t> chosen;

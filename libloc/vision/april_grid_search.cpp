@@ -349,7 +349,7 @@ AprilGridSearch::~AprilGridSearch() = default;
 
 TargetDetection AprilGridSearch::find(const cv::Mat& gray) const {
   const int tag_count = target_.columns * target_.rows;
-  const std::size_t needed = static_cast<std::size_t>(std::min(options_.min_tags, tag_count));
+  const auto needed = static_cast<std::size_t>(std::min(options_.min_tags, tag_count));
   const auto check = [&](const Quad& quad, int tag) {
     const auto wrong = library_->wrong_cells(gray, quad, target_.first_tag + tag, options_.min_contrast);
     return wrong && *wrong <= kMaxWrongCells;

@@ -19,10 +19,10 @@ struct Grid {
   Corners corners;
   int columns;
   int rows;
-  cv::Point2f at(int column, int row) const {
-    return corners[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
-                   static_cast<std::size_t>(column)];
+  std::size_t index(int column, int row) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(column);
   }
+  const cv::Point2f& at(int column, int row) const { return corners[index(column, row)]; }
   Grid turned() const {  // by half a turn
     Grid out = *this;
     std::ranges::reverse(out.corners);
@@ -31,10 +31,7 @@ struct Grid {
   Grid mirrored() const {  // rows from the other side
     Grid out = *this;
     for (int r = 0; r < rows; ++r) {
-      for (int c = 0; c < columns; ++c) {
-        out.corners[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(c)] =
-            at(c, rows - 1 - r);
-      }
+      for (int c = 0; c < columns; ++c) out.corners[index(c, r)] = at(c, rows - 1 - r);
     }
     return out;
   }
@@ -137,7 +134,7 @@ bool among_neighbours(const Grid& grid, const std::vector<bool>& good, int colum
     pixels.clear();
     for (int r = std::max(0, row - reach); r <= std::min(grid.rows - 1, row + reach); ++r) {
       for (int c = std::max(0, column - reach); c <= std::min(grid.columns - 1, column + reach); ++c) {
-        if ((r == row && c == column) || !good[static_cast<std::size_t>(r * grid.columns + c)]) continue;
+        if ((r == row && c == column) || !good[grid.index(c, r)]) continue;
         board.emplace_back(c - column, r - row);
         pixels.emplace_back(grid.at(c, r));
         spacing = std::min(spacing, cv::norm(grid.at(c, r) - corner));

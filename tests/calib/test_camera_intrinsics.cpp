@@ -278,8 +278,9 @@ TEST(CameraFit, SaysWhatIsMissing) {
   const CalibrationTarget grid = parse_target("aprilgrid 6x6 0.03 0.3");
   const CameraFit wrong =
       calibrate_camera(parse_target("aprilgrid 6x6 0.03 0.2"), look_at(grid, truth, Random(6)), 752, 480, {});
-  EXPECT_NE(wrong.quality.verdict, Verdict::kOk);
-  EXPECT_GT(wrong.noise_px, 0.5);
+  EXPECT_EQ(wrong.quality.verdict, Verdict::kRefused);
+  EXPECT_TRUE(mentions(wrong.quality, "a spacing of 0.3 far better than the target's 0.2"))
+      << wrong.quality.reasons.front();
 }
 
 TEST(CameraFit, ErrorsNameTheValue) {

@@ -69,7 +69,7 @@ ImageMeasurement from(const cv::Mat& picture) {
   return image_of(picture, PixelFormat::kGray);
 }
 
-TEST(Target, CornersOfACheckerboardAreWhereTheyAreProjected) {
+TEST(TargetDetector, CornersOfACheckerboardAreWhereTheyAreProjected) {
   for (const CameraCalibration& calibration : {radtan_camera(), fisheye_camera()}) {
     const Camera camera(calibration);
     const TargetDetector detector(board_target(), {});
@@ -88,7 +88,7 @@ TEST(Target, CornersOfACheckerboardAreWhereTheyAreProjected) {
   }
 }
 
-TEST(Target, CornersOfAnAprilGridAreWhereTheyAreProjected) {
+TEST(TargetDetector, CornersOfAnAprilGridAreWhereTheyAreProjected) {
   if (!finds_april_grids()) GTEST_SKIP() << "built without the library apriltag";
   for (const CameraCalibration& calibration : {radtan_camera(), fisheye_camera()}) {
     const Camera camera(calibration);
@@ -107,7 +107,7 @@ TEST(Target, CornersOfAnAprilGridAreWhereTheyAreProjected) {
   }
 }
 
-TEST(Target, PartOfAnAprilGridIsEnough) {
+TEST(TargetDetector, PartOfAnAprilGridIsEnough) {
   if (!finds_april_grids()) GTEST_SKIP() << "built without the library apriltag";
   const Camera camera(radtan_camera());
   const TargetDetector detector(grid_target(), {});
@@ -132,7 +132,7 @@ TEST(Target, PartOfAnAprilGridIsEnough) {
   EXPECT_LT(errors.worst, 1);  // at its edge; other saddles are 5 px away
 }
 
-TEST(Target, OtherTagsAreNotTakenForTheGrid) {
+TEST(TargetDetector, OtherTagsAreNotTakenForTheGrid) {
   if (!finds_april_grids()) GTEST_SKIP() << "built without the library apriltag";
   // A board of the same family with other numbers, a single tag with a number of the grid, and both beside the grid.
   const Scene other = april_grid({.columns = 3, .rows = 3, .first_tag = 200, .corner_squares = false});
@@ -158,7 +158,7 @@ TEST(Target, OtherTagsAreNotTakenForTheGrid) {
   EXPECT_LT(errors.worst, 0.5);
 }
 
-TEST(Target, NumbersOfACheckerboardDoNotDependOnHowItIsHeld) {
+TEST(TargetDetector, NumbersOfACheckerboardDoNotDependOnHowItIsHeld) {
   const Camera camera(radtan_camera());
   const SceneRenderer renderer(board_scene(), radtan_camera(), {});
   const TargetDetector detector(board_target(), {});
@@ -184,7 +184,7 @@ TEST(Target, NumbersOfACheckerboardDoNotDependOnHowItIsHeld) {
   EXPECT_TRUE(TargetDetector(grid_target(), {}).detect(from(mirrored)).view.corners.empty());
 }
 
-TEST(Target, BlurredPicturesGiveFewerCornersNotWrongOnes) {
+TEST(TargetDetector, BlurredPicturesGiveFewerCornersNotWrongOnes) {
   const Camera camera(radtan_camera());
   const Pose3 pose = in_front(kMiddleOfBoard, 1.1, {0.2, 0.2, 0});
   std::vector<Pose3> shaken;  // 12 px along the exposure
@@ -200,7 +200,7 @@ TEST(Target, BlurredPicturesGiveFewerCornersNotWrongOnes) {
   EXPECT_TRUE(!seen.view.corners.empty() || !seen.reason.empty());
 }
 
-TEST(Target, AnyPictureIsSearchedWithoutHarm) {
+TEST(TargetDetector, AnyPictureIsSearchedWithoutHarm) {
   std::vector<TargetDetector> detectors;
   detectors.emplace_back(board_target(), TargetDetectorOptions{.thorough = false});
   if (finds_april_grids()) detectors.emplace_back(grid_target(), TargetDetectorOptions{});
@@ -230,7 +230,7 @@ TEST(Target, AnyPictureIsSearchedWithoutHarm) {
   EXPECT_THROW(TargetDetector(wrong, {}), std::invalid_argument);
 }
 
-TEST(Target, LargeAndColouredPictures) {
+TEST(TargetDetector, LargeAndColouredPictures) {
   const Pose3 pose = in_front(kMiddleOfBoard, 1.1, {0.2, 0.2, 0});
   CameraCalibration large = radtan_camera();
   large.width_px = 1504;  // more than is searched at once
@@ -249,7 +249,7 @@ std::filesystem::path opencv_pictures() {
 }
 
 // 13 pictures each of a left and a right camera, from detection to the camera; the corners' own solution by OpenCV.
-TEST(Target, RealCheckerboardsGiveTheCameraThatOpenCvFinds) {
+TEST(TargetDetector, RealCheckerboardsGiveTheCameraThatOpenCvFinds) {
   if (!std::filesystem::exists(opencv_pictures() / "left01.jpg")) {
     GTEST_SKIP() << opencv_pictures().string()
                  << " has no left01.jpg (Debian: opencv-doc); LIBLOC_OPENCV_DOC names the folder";
@@ -294,7 +294,7 @@ TEST(Target, RealCheckerboardsGiveTheCameraThatOpenCvFinds) {
 }
 
 // The whole way: pictures of a known camera, detection, calibration.
-TEST(Target, RenderedPicturesGiveTheirCamera) {
+TEST(TargetDetector, RenderedPicturesGiveTheirCamera) {
   for (const CameraCalibration& truth : {radtan_camera(), fisheye_camera()}) {
     const bool grid = truth.distortion_model == DistortionModel::kEquidistant && finds_april_grids();
     const CalibrationTarget target = grid ? grid_target() : board_target();
