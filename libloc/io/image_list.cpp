@@ -30,6 +30,10 @@ bool is_picture(const fs::path& path) {
   return std::ranges::find(kEndings, ending) != kEndings.end();
 }
 
+bool is_kept_picture(const fs::path& path) {
+  return !path.filename().string().starts_with('.') && is_picture(path);
+}
+
 // 2 before 10: digits are compared as numbers, all else as letters.
 bool natural_less(std::string_view a, std::string_view b) {
   std::size_t i = 0;
@@ -61,8 +65,7 @@ std::vector<fs::path> pictures_in(const fs::path& folder) {
   std::vector<fs::path> out;
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
-    if (!name.starts_with('.') && is_picture(entry->path())) out.push_back(entry->path());
+    if (is_kept_picture(entry->path())) out.push_back(entry->path());
   }
   if (error) throw DataError(folder.string() + ": cannot be read: " + error.message());
   if (out.empty()) throw DataError(folder.string() + ": no pictures in it (png, jpg, bmp, tif, pgm, ppm, webp)");
@@ -141,6 +144,14 @@ std::optional<std::int64_t> last_number(std::string_view stem) {
 }
 
 }  // namespace
+
+bool is_image_folder(const fs::path& folder) {
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    if (is_kept_picture(entry->path())) return true;
+  }
+  return false;
+}
 
 std::vector<std::int32_t> euroc_cameras(const fs::path& folder) {
   const fs::path mav = mav_folder(folder);

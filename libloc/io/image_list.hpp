@@ -26,6 +26,9 @@ struct ImageList {
   NamedCounts counts;
 };
 
+/// Whether a folder has pictures in it (by their endings). False for what is no folder.
+bool is_image_folder(const std::filesystem::path& folder);
+
 /// Where the cameras of an EuRoC recording are: cam0, cam1, … as far as they have a data.csv.
 /// @param folder the one that holds mav0, or mav0 itself. @return their numbers, ascending.
 std::vector<std::int32_t> euroc_cameras(const std::filesystem::path& folder);

@@ -21,6 +21,7 @@
 #include "support/sources.hpp"
 #include "tools/support/camera_source.hpp"
 #include "tools/support/lcm_link.hpp"
+#include "tools/support/open_source.hpp"
 #include "tools/support/program.hpp"
 
 namespace loc::test {
@@ -278,6 +279,12 @@ TEST_F(PictureDriver, AFolderOfPicturesAsGreyAndAsJpeg) {
   }
   const std::string stored = text_of(folder_.path("p/3.jpg"));
   EXPECT_EQ(std::string(images_[3].data->begin(), images_[3].data->end()), stored) << "not decoded";
+  EXPECT_EQ(guess_source_kind(folder_.path("p")), "images");
+  std::filesystem::create_directories(folder_.path("euroc/mav0"));
+  write_image(folder_.path("euroc/preview.png"), picture(1));
+  EXPECT_EQ(guess_source_kind(folder_.path("euroc")), "euroc");
+  EXPECT_EQ(guess_source_kind(folder_.path("drive.MP4")), "video");
+  EXPECT_EQ(guess_source_kind(folder_.path("drive.rawlog")), "rawlog");
   const auto usage = [&](std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "images");
     return run("loc-driver", arguments, folder_.path("driver.err"));

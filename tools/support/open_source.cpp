@@ -7,6 +7,7 @@
 
 #include "libloc/io/broad.hpp"
 #include "libloc/io/euroc.hpp"
+#include "libloc/io/image_list.hpp"
 #include "libloc/io/nmea_source.hpp"
 #include "libloc/io/rig_yaml.hpp"
 #include "msgs/lcm_log_source.hpp"
@@ -25,6 +26,18 @@ bool holds_nmea(const std::string& path) {
   return reader.next(bytes) != nullptr;
 }
 
+// Pictures, and no EuRoC recording.
+bool holds_pictures(const std::filesystem::path& folder) {
+  std::error_code error;
+  for (const char* name : {"mav0", "imu0", "cam0"}) {
+    if (std::filesystem::exists(folder / name, error)) return false;
+  }
+  for (const char* name : {"rgb.txt", "times.txt"}) {
+    if (std::filesystem::exists(folder / name, error)) return true;
+  }
+  return is_image_folder(folder);
+}
+
 }  // namespace
 
 bool is_receiver(const std::string& source_kind) {
@@ -41,10 +54,14 @@ bool needs_vision(const SourceSpec& spec) {
 }
 
 std::string guess_source_kind(const std::string& path) {
-  if (std::filesystem::is_directory(path)) return "euroc";
+  if (std::filesystem::is_directory(path)) return holds_pictures(path) ? "images" : "euroc";
   const std::string extension = std::filesystem::path(path).extension();
   if (extension == ".csv") return is_eqvio(path) ? "eqvio" : "csv";
   if (extension == ".mat") return "broad";
+  if (extension == ".rawlog") return kRawlog;
+  for (const char* video : {".mp4", ".avi", ".mkv", ".mov", ".webm", ".MP4", ".AVI", ".MKV", ".MOV"}) {
+    if (extension == video) return "video";
+  }
   if (extension == ".nmea" || holds_nmea(path)) return "nmea";
   return "lcm-log";
 }
