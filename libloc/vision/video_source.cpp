@@ -88,7 +88,7 @@ class VideoSource final : public MeasurementSource {
   // Since the beginning of the file.
   TimeNs time_of_frame() {
     const double given_rate = options_.rate_hz;
-    const double n = static_cast<double>(frame_);
+    const auto n = static_cast<double>(frame_);
     double time_s = n / given_rate;
     if (given_rate == 0) {
       const double container_s = container_ms_ * 1e-3;
