@@ -12,7 +12,7 @@ GPX = "{http://www.topografix.com/GPX/1/1}"
 KML = "{http://www.opengis.net/kml/2.2}"
 GX = "{http://www.google.com/kml/ext/2.2}"
 LOC = "{urn:libloc:geo:1}"
-NAME = 'a <b> & "c" \'d\' ü 東 \U0001f697 ]]>'
+NAME = "a <b> & \"c\" 'd' ü 東 \U0001f697 ]]>"
 
 
 @pytest.fixture
@@ -48,7 +48,9 @@ def test_gpx(tmp_path, path):
     assert [len(s) for s in track.findall(GPX + "trkseg")] == [20, 30]
     points = list(track.iter(GPX + "trkpt"))
     assert [child.tag for child in points[0]] == [GPX + "ele", GPX + "time", GPX + "extensions"]
-    read = np.array([[float(p.attrib["lat"]), float(p.attrib["lon"]), float(p.find(GPX + "ele").text)] for p in points])
+    read = np.array(
+        [[float(p.attrib["lat"]), float(p.attrib["lon"]), float(p.find(GPX + "ele").text)] for p in points]
+    )
     np.testing.assert_allclose(np.deg2rad(read[:, :2]), places[:, :2], atol=1e-11)
     np.testing.assert_allclose(read[:, 2], places[:, 2], atol=6e-4)
     stamps = np.array([np.datetime64(p.find(GPX + "time").text.rstrip("Z"), "ns") for p in points])
@@ -71,7 +73,7 @@ def test_kml(tmp_path, path):
     np.testing.assert_allclose(read[:, 2], places[:, 2] - 48, atol=6e-4)
 
     libloc.write_kml(tmp_path / "y.kml", places)
-    line = ET.parse(tmp_path / "y.kml").find(f".//{KML}MultiGeometry/{KML}LineString/{KML}coordinates").text.split()
+    line = ET.parse(tmp_path / "y.kml").find(f".//{KML}LineString/{KML}coordinates").text.split()
     assert len(line) == 50
     assert all(len(c.split(",")) == 3 for c in line)
 
@@ -97,7 +99,7 @@ def test_geojson(tmp_path, path):
 
 
 def test_wrong_input(tmp_path, path):
-    places, times, horizontal, _ = path
+    places, times, _, _ = path
     file = tmp_path / "x.gpx"
     with pytest.raises(ValueError, match="utc_ns"):
         libloc.write_gpx(file, places, utc_ns=times[:-1])
