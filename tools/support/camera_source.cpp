@@ -158,7 +158,7 @@ class CameraSource final : public MeasurementSource {
     thread_ = std::make_unique<GrabThread>(std::move(grabber), options_.capacity);
     last_frame_ns_ = steady_now();
     reconnection_.connected(connection_.name);
-    log_info("event=camera_set name=\"{}\" as=\"{}\"", connection_.name, description);
+    log_info(R"(event=camera_set name="{}" as="{}")", connection_.name, description);
   }
 
   void disconnect(const std::string& why) {
@@ -183,8 +183,7 @@ class CameraSource final : public MeasurementSource {
     }
     if (at_arrival_++ == 0) {
       log_warning(
-          "event=camera_stamps name=\"{}\" reason=\"its stamps are not of the host's clocks\" effect=\"time of "
-          "arrival instead\"",
+          R"(event=camera_stamps name="{}" reason="its stamps are not of the host's clocks" effect="time of arrival instead")",
           connection_.name);
     }
     return grabbed.host_ns;
@@ -197,7 +196,7 @@ class CameraSource final : public MeasurementSource {
       if (options_.convert) image = options_.convert(std::move(image));
     } catch (const DataError& error) {
       if (damaged_++ == 0)
-        log_warning("event=picture_damaged name=\"{}\" reason=\"{}\"", connection_.name, error.what());
+        log_warning(R"(event=picture_damaged name="{}" reason="{}")", connection_.name, error.what());
       return std::nullopt;
     }
     reconnection_.trouble("");

@@ -59,7 +59,7 @@ class GeoOutput final : public EstimateOutput {
     }
     if (left_out_ > 0) log_warning("event=left_out file=\"{}\" estimates_not_tied_to_the_earth={}", path_, left_out_);
     if (without_time_ > 0) {
-      log_warning("event=no_time_of_day file=\"{}\" points={} effect=\"written without times\"", path_, without_time_);
+      log_warning(R"(event=no_time_of_day file="{}" points={} effect="written without times")", path_, without_time_);
     }
     const std::string ending = std::filesystem::path(path_).extension();
     if (ending == ".gpx") write_gpx(path_, track_);

@@ -30,8 +30,8 @@ ImageMeasurement published(ImageMeasurement image, const ImageSpec& spec) {
 
 class JpegSource final : public MeasurementSource {
  public:
-  JpegSource(std::unique_ptr<MeasurementSource> source, const ImageSpec& spec)
-      : source_(std::move(source)), spec_(spec) {}
+  JpegSource(std::unique_ptr<MeasurementSource> source, ImageSpec spec)
+      : source_(std::move(source)), spec_(std::move(spec)) {}
   std::optional<Measurement> next() override {
     std::optional<Measurement> measurement = source_->next();
     auto* image = measurement ? std::get_if<ImageMeasurement>(&*measurement) : nullptr;

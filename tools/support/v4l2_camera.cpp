@@ -78,7 +78,8 @@ void look_at(const std::string& device) {
 
 class V4l2Grabber final : public CameraGrabber {
  public:
-  V4l2Grabber(std::string device, const CameraSettings& settings) : device_(std::move(device)), settings_(settings) {
+  V4l2Grabber(std::string device, CameraSettings settings)
+      : device_(std::move(device)), settings_(std::move(settings)) {
     look_at(device_);
     // A select of OpenCV lasts ten seconds otherwise, and nobody could stop it.
     ::setenv("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1", 0);
