@@ -71,7 +71,7 @@ struct Anchor {
 
 struct Track {
   std::int64_t id = -1;
-  Patch patch;
+  ImagePatch patch;
   Anchor anchor;
   Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
   Eigen::Vector2d last_px = Eigen::Vector2d::Zero();  // in the picture before
@@ -320,7 +320,7 @@ void FeatureTracker::Work::confirm(Track& track, const Eigen::Vector2d& place, c
     }
   }
   // It looks different by now. Is it where the last picture says?
-  Patch last;
+  ImagePatch last;
   if (!last.cut(before_view(), track.last_px) || !last.warp(Eigen::Matrix2d::Identity(), patch)) return;
   const PatchMatch fine = align_patch(patch, view(), place, kFarthestAlign);
   if (!fine.found || fine.correlation < options.min_correlation || (fine.pixel_px - place).norm() > kKltDisagrees)

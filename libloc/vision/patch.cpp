@@ -65,7 +65,7 @@ Sums sums_at(const WarpedPatch& patch, const GrayView& image, int middle_x, int 
 
 }  // namespace
 
-bool Patch::cut(const GrayView& image, const Eigen::Vector2d& pixel_px) {
+bool ImagePatch::cut(const GrayView& image, const Eigen::Vector2d& pixel_px) {
   half_ = 0;
   if (!pixel_px.allFinite()) return false;
   const double x = std::round(pixel_px.x());
@@ -82,7 +82,7 @@ bool Patch::cut(const GrayView& image, const Eigen::Vector2d& pixel_px) {
   return true;
 }
 
-bool Patch::warp(const Eigen::Matrix2d& warp, WarpedPatch& out) const {
+bool ImagePatch::warp(const Eigen::Matrix2d& warp, WarpedPatch& out) const {
   if (half_ == 0 || !warp.allFinite() || !(std::abs(warp.determinant()) > kLeastDeterminant)) return false;
   const Eigen::Matrix2d back = warp.inverse();
   constexpr int kBorder = kPatchHalf + 1;

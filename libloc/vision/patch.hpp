@@ -39,7 +39,7 @@ struct WarpedPatch {
 };
 
 /// What was seen around a feature when it was first seen, with room for warps.
-class Patch {
+class ImagePatch {
  public:
   static constexpr int kHalf = 22;
 
