@@ -249,6 +249,19 @@ TEST(Corners, AreSpreadStrongestFirstAndKeepTheirDistance) {
   for (const auto& [cell, count] : cells) EXPECT_EQ(count, 1);
   EXPECT_FALSE(cells.contains({7, 4}));  // the cell of a place that was taken
   const double strongest = corners[0].strength;
+  // Places beside the corners, in other cells where a border runs between.
+  std::vector<Vector2d> beside;
+  for (const Corner& c : corners) beside.push_back(c.pixel_px + Vector2d(11, 0));
+  std::vector<Corner> others;
+  find_corners(view, beside, options, others);
+  for (const Corner& c : others) {
+    for (const Vector2d& other : beside) EXPECT_GE((c.pixel_px - other).norm(), options.min_separation_px);
+  }
+  options.min_strength = strongest / 2;
+  find_corners(view, taken, options, others);
+  EXPECT_LT(others.size(), corners.size());
+  for (const Corner& c : others) EXPECT_GE(c.strength, strongest / 2);
+  options.min_strength = CornerOptions{}.min_strength;
   options.most = 10;
   find_corners(view, taken, options, corners);
   ASSERT_EQ(corners.size(), 10U);
