@@ -60,6 +60,17 @@ class ImageSlam {
     tracker_.reset();
   }
 
+  /// The end of a recording: frames that wait for the IMU are taken, see InertialSlam::finish. A camera alone has none.
+  bool finish() {
+    if constexpr (std::is_same_v<Slam, MonoSlam>) {
+      return false;
+    } else {
+      const bool is_new = slam_.finish();
+      learn();
+      return is_new;
+    }
+  }
+
   const Slam& slam() const { return slam_; }
   const FeatureTracker& tracker() const { return tracker_; }
   /// What the last picture's features were looked for by, and what was found.

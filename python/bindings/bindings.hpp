@@ -18,6 +18,7 @@ void bind_error_state(pybind11::module_& m);
 void bind_slam_options(pybind11::module_& m);
 void bind_slam(pybind11::module_& m);
 void bind_slam_files(pybind11::module_& m);
+void bind_image_slam(pybind11::module_& m);
 void bind_ellipsoid(pybind11::module_& m);
 void bind_clock(pybind11::module_& m);
 void bind_eval(pybind11::module_& m);
