@@ -137,7 +137,7 @@ class PyImageSlam {
   bool process(const Measurement& measurement);
   bool finish();
   void record(bool with_covariance, bool with_features);
-  std::pair<SlamRun, py::dict> recorded();
+  std::pair<SlamRun, py::dict> recorded(bool stopped);
   void reset() {
     const Working working(busy_);
     std::visit([](auto& slam) { slam.reset(); }, slam_);
@@ -236,11 +236,12 @@ void PyImageSlam::record(bool with_covariance, bool with_features) {
   front_end_ = {};
 }
 
-std::pair<SlamRun, py::dict> PyImageSlam::recorded() {
+std::pair<SlamRun, py::dict> PyImageSlam::recorded(bool stopped) {
   const Working working(busy_);
   if (!recording_) throw std::runtime_error("nothing was recorded: call record() before the first picture");
   recording_ = false;
   SlamRun run = std::exchange(columns_, {}).take();
+  run.stopped = stopped;
   visit([&](auto& slam) {
     run.map = locpy::arrays_of(slam.slam().map());
     run.totals = as_map(slam.counts());
@@ -400,7 +401,7 @@ void bind_slam_of_images(py::module_& m) {
           "A copy.")
       .def("record", &S::record, py::arg("with_covariance") = true, py::arg("with_features") = false,
            "From now on every frame is kept for recorded().")
-      .def("recorded", &S::recorded,
+      .def("recorded", &S::recorded, py::arg("stopped") = false,
            "What was kept since record(), which ends: a SlamRun with a row for each frame, and {name: (P,)} with a row "
            "for each picture: time_ns; tracks, of these searched, klt, cut_anew, refound, new; lost since the picture "
            "before; pyramid_s, search_s, klt_s, detect_s, their sum front_end_s, and picture_s, which has besides what "

@@ -6,6 +6,11 @@ world has z up (unless NED is chosen), body is the IMU; T_a_b takes coordinates 
 
 from libloc._core import *  # noqa: F403
 from libloc._core import so3 as so3
+from libloc.images import ImageSlamRun as ImageSlamRun
+from libloc.images import open_pictures as open_pictures
+from libloc.images import picture_format as picture_format
+from libloc.images import pictures as pictures
+from libloc.images import run_image_slam as run_image_slam
 from libloc.recordings import file_format as file_format
 from libloc.recordings import open_recording as open_recording
 from libloc.recordings import read_recording as read_recording

@@ -1,16 +1,17 @@
-"""loc-slam: where a camera was and what it saw, from features with identities; off line.
+"""loc-slam: where a camera was and what it saw, from pictures or features with identities; off line.
 
-INPUT is a tracks file (rows `frame feature dimension value`) or a recording with features (LCM log, EqVIO's
-file of tracks and IMU); its content tells. A recording without features (EuRoC folder, CSV) gives IMU and
-truth where --tracks has the features. --config is the rig file with the camera's calibration, which an
-EqVIO file brings along.
+INPUT is a video, a folder of pictures, a EuRoC recording, an LCM log with features or pictures, a tracks file
+(rows `frame feature dimension value`) or EqVIO's file of tracks and IMU; its content tells. A recording
+without features (EuRoC folder, CSV) gives IMU and truth where --tracks has the features. --config is the rig
+file with the camera's calibration, which an EqVIO file and a EuRoC folder (cam0/sensor.yaml) bring along.
 
 mono-slam needs nothing but the camera: lengths are in a unit of their own then, and the world is where the
 camera began, which looks along x with z up. inertial-slam takes the recording's IMU as well: metres, and a
 world with z up. --output gets the trajectory (TUM, see --pose), the map (PLY), a CSV with a line for each
 frame, summary.txt and summary.json, the settings (slam.yaml), the state to go on from (state.slam, see
---map-in), and pictures. Where there is truth (--reference, or in the recording) the trajectory is compared
-with it after an alignment: similarity for a camera alone, rigid where lengths are metres.
+--map-in), and pictures; from pictures a video of the features, too. Where there is truth (--reference, or in
+the recording) the trajectory is compared with it after an alignment: the camera's centre by a similarity for
+a camera alone, body rigidly where lengths are metres.
 
 Exit codes: 0 done, 1 the data cannot be used (the message says why), 2 wrong options, 130 interrupted: what
 there was by then is written.
@@ -27,13 +28,23 @@ from contextlib import contextmanager
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from types import FrameType
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 import libloc
 from libloc import DataError
-from libloc.programs.slam_input import METHODS, method_of, read_input, saved_state, slam_options
+from libloc.programs.slam_input import (
+    METHODS,
+    SlamInput,
+    front_end_options,
+    method_of,
+    read_input,
+    saved_state,
+    slam_options,
+)
+from libloc.programs.slam_pictures import Watcher
 from libloc.programs.slam_result import SlamResult, against_truth, report, text_of, write
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
@@ -69,7 +80,9 @@ def make_parser() -> argparse.ArgumentParser:
         prog="loc-slam", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--version", action="version", version=libloc.__version__)
-    parser.add_argument("input", type=Path, metavar="INPUT", help="tracks file or recording")
+    parser.add_argument(
+        "input", type=Path, metavar="INPUT", help="video, folder of pictures, recording or tracks file"
+    )
     parser.add_argument(
         "--config",
         type=Path,
@@ -105,13 +118,37 @@ def make_parser() -> argparse.ArgumentParser:
         "--rate-hz",
         type=_positive,
         metavar="HZ",
-        help="frames a second of a tracks file (default: rate_hz of the camera in --config)",
+        help="frames a second of a tracks file (default: rate_hz of the camera in --config), of a folder of "
+        "numbered pictures, or of a video in place of its own times",
     )
     parser.add_argument(
         "--start-time",
         type=_seconds,
         metavar="S",
-        help="of frame 0 of a tracks file, on the clock of the recording or --reference (default: 0)",
+        help="of frame 0 of a tracks file or the first picture of a folder or video, on the clock of the "
+        "recording, --imu or --reference (default: 0)",
+    )
+    group = parser.add_argument_group("pictures")
+    group.add_argument(
+        "--name-unit",
+        choices=("ns", "us", "ms", "s"),
+        help="of the times that the pictures of a folder are called by",
+    )
+    group.add_argument(
+        "--imu", type=Path, metavar="FILE", help="recording with the IMU of a video or folder (inertial-slam)"
+    )
+    group.add_argument(
+        "--front-end",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="a field of FeatureTrackerOptions, may come several times: --front-end max_tracks=150",
+    )
+    group.add_argument(
+        "--video",
+        type=Path,
+        metavar="FILE",
+        help="features over all pictures, .mp4 or .avi (default: the first half minute, as features.mp4)",
     )
     parser.add_argument(
         "--map-in", type=Path, metavar="FILE", help="go on from the map and state (state.slam) of another run"
@@ -137,7 +174,9 @@ def make_parser() -> argparse.ArgumentParser:
         default="body",
         help="of the trajectory that is written (%(default)s)",
     )
-    group.add_argument("--no-plots", action="store_true", help="no pictures")
+    group.add_argument(
+        "--no-plots", action="store_true", help="no pictures, and no video that was not asked for"
+    )
     return parser
 
 
@@ -148,15 +187,16 @@ class _PlainBar:
         self._file = file
         self._began = time.monotonic()
 
-    def __call__(self, done: int, total: int) -> None:
-        left = (time.monotonic() - self._began) * (total - done) / max(done, 1)
-        print(
-            f"\rloc-slam: {done} of {total} frames, {left:.0f} s left ", end="", file=self._file, flush=True
-        )
+    def __call__(self, done: int, total: int | None) -> None:
+        text = f"{done} frames"
+        if total is not None:
+            left = (time.monotonic() - self._began) * max(total - done, 0) / max(done, 1)
+            text = f"{done} of {total} frames, {left:.0f} s left"
+        print(f"\rloc-slam: {text} ", end="", file=self._file, flush=True)
 
 
 @contextmanager
-def _progress() -> Iterator[Callable[[int, int], None]]:
+def _progress() -> Iterator[Callable[[int, int | None], None]]:
     """Tells how far it is on the error stream, where that is a terminal: a bar with rich, text without it."""
     if not sys.stderr.isatty():
         yield lambda done, total: None
@@ -213,24 +253,74 @@ def run(options: argparse.Namespace) -> SlamResult:
             file=sys.stderr,
         )
     began = time.monotonic()
-    with _interrupt() as interrupted, _progress() as progress:
+    watcher, front_end = None, None
+    if given.pictures is not None:
+        ran, front_end, watcher = _run_pictures(options, given, slam)
+    else:
+        with _interrupt() as interrupted, _progress() as progress:
 
-        def go_on(done: int, total: int) -> bool:
-            progress(done, total)
-            return not interrupted()
+            def go_on(done: int, total: int) -> bool:
+                progress(done, total)
+                return not interrupted()
 
-        ran = libloc.run_slam(
-            given.features, slam, imu=given.imu, rig=given.rig, start_from=start_from, progress=go_on
-        )
+            ran = libloc.run_slam(
+                given.features, slam, imu=given.imu, rig=given.rig, start_from=start_from, progress=go_on
+            )
     elapsed_s = time.monotonic() - began
     truth, failure = None, ""
     if given.reference is not None:
         try:
-            truth = against_truth(ran, given.reference, options.align, metric=not _scale_unknown(ran))
+            truth = against_truth(
+                ran, given.reference, options.align, not _scale_unknown(ran), slam.camera.T_body_camera
+            )
         except DataError as error:
             failure = str(error)
-    frames = int(np.sum(np.asarray(given.features.camera) == options.camera))
-    return SlamResult(given, method_of(slam), slam, ran, frames, truth, failure, elapsed_s)
+    if front_end is None:
+        frames = int(np.sum(np.asarray(given.features.camera) == options.camera))
+    else:
+        frames = len(front_end["time_ns"])
+        if ran.stopped and given.pictures.total is not None:
+            frames = given.pictures.total
+    return SlamResult(
+        given, method_of(slam), slam, ran, frames, truth, failure, elapsed_s, front_end, watcher
+    )
+
+
+def _run_pictures(
+    options: argparse.Namespace, given: SlamInput, slam: libloc.SlamOptions
+) -> tuple[libloc.SlamRun, dict[str, NDArray[Any]], Watcher]:
+    if options.map_in is not None:
+        raise DataError(f"--map-in {options.map_in}: from pictures the identities of features begin anew")
+    front_end = front_end_options(options.front_end)
+    video = options.video
+    if video is None and options.output is not None and not options.no_plots:
+        video = options.output / "features.mp4"
+    watcher = Watcher(video, slam.camera.rate_hz, whole_video=options.video is not None)
+    with _interrupt() as interrupted, _progress() as progress:
+        shown_at = 0.0
+
+        def go_on(done: int) -> bool:
+            nonlocal shown_at
+            if time.monotonic() - shown_at > 0.1 or done == given.pictures.total:
+                shown_at = time.monotonic()
+                progress(done, given.pictures.total)
+            return not interrupted()
+
+        ran = libloc.run_image_slam(
+            given.pictures.open(),
+            slam,
+            front_end=front_end,
+            # An LCM log gives the IMU by itself, in its order.
+            imu=None if given.pictures.form == "lcm" else given.imu,
+            rig=given.rig,
+            watch=watcher,
+            progress=go_on,
+        )
+    watcher.video_path = watcher.finish()
+    if watcher.video_failure:
+        print(f"loc-slam: warning: no video: {watcher.video_failure}", file=sys.stderr)
+    given.counts |= ran.counts
+    return ran.frames, ran.front_end, watcher
 
 
 def _scale_unknown(ran: libloc.SlamRun) -> bool:

@@ -1,4 +1,5 @@
-"""What loc-slam reads: features with identities from a tracks file or a recording; rig, options, truth."""
+"""What loc-slam reads: features with identities from a tracks file or a recording, or pictures; rig, options,
+truth."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ import numpy as np
 import libloc
 from libloc import DataError, SlamMotion, SlamOptions
 from libloc.programs.evaluate_input import Poses, normalised, read_reference
+from libloc.programs.slam_pictures import PictureInput, find_pictures, rig_of_euroc
 
 # The methods as loc-estimator calls them.
 METHODS = {"mono-slam": SlamMotion.CONSTANT_VELOCITY, "inertial-slam": SlamMotion.INERTIAL}
@@ -21,12 +23,14 @@ METHODS = {"mono-slam": SlamMotion.CONSTANT_VELOCITY, "inertial-slam": SlamMotio
 @dataclass
 class SlamInput:
     path: Path
-    form: str  # "tracks", or as libloc.file_format names it
-    features: libloc.FeaturesArrays | libloc.FrameFeatures
+    form: str  # "tracks", or as libloc.file_format or libloc.picture_format names it
+    features: libloc.FeaturesArrays | libloc.FrameFeatures | None
     imu: libloc.ImuArrays | None
     rig: libloc.Rig
     reference: Poses | None
     counts: dict[str, int] = field(default_factory=dict)  # what was read and skipped, and why
+    images: int = 0  # pictures in a recording
+    pictures: PictureInput | None = None  # in place of features
 
 
 def _is_tracks_file(path: Path) -> bool:
@@ -97,50 +101,83 @@ def read_input(options: argparse.Namespace) -> SlamInput:
             raise DataError(
                 f"{options.config}: has {len(rig.cameras)} cameras, the one asked for is {options.camera}"
             )
-    form = libloc.file_format(path)
-    if rig is None and form != "eqvio":
-        raise DataError(f"{path}: does not tell the camera's calibration: give --config")
-    images = 0
-    if form == "tum" and _is_tracks_file(path):
-        assert rig is not None
-        if options.tracks is not None:
-            raise DataError(f"{path}: is a tracks file, --tracks is for recordings")
-        features, counts = _read_tracks(path, options, rig)
-        given = SlamInput(path, "tracks", features, None, rig, None, counts)
+    pictures = find_pictures(path, options)
+    if pictures is not None and pictures.form != "lcm":
+        given = _read_pictures(pictures, rig, options)
     else:
-        recording, rig = _read_recording(path, form, rig, options.camera)
-        reference = None if options.reference else _own_reference(path, form, recording)
-        given = SlamInput(path, form, recording.features, recording.imu, rig, reference, recording.counts)
-        images = recording.images
-        if options.tracks is not None:
-            if options.start_time is None:
-                raise DataError(
-                    f"{options.tracks}: a tracks file has no times: give --start-time, on the clock of {path}"
-                )
-            given.features, counts = _read_tracks(options.tracks, options, rig)
-            given.counts |= counts
-        else:
-            for name in ("rate_hz", "start_time"):
-                if getattr(options, name) is not None:
-                    option = f"--{name.replace('_', '-')}"
-                    raise DataError(
-                        f"{path}: is a recording with times of its own, {option} is for tracks files"
-                    )
-    if not np.any(np.asarray(given.features.camera) == options.camera):
-        cameras = sorted(set(given.features.camera.tolist()))
-        held = (
-            f"those of cameras {cameras}"
-            if cameras
-            else "none at all (--tracks takes them from another file)"
-        )
-        if images:
-            held += f", and {images} pictures, which are not searched for features"
-        raise DataError(f"{path}: no features of camera {options.camera} in it; it holds {held}")
+        given = _read_features(path, rig, options)
+        if not np.any(np.asarray(given.features.camera) == options.camera):
+            if pictures is None or not given.images:
+                raise DataError(_no_features(path, given, options.camera))
+            given.features, given.pictures = None, pictures
+    if given.pictures is None:
+        for name in ("imu", "name_unit", "video"):
+            if getattr(options, name) is not None:
+                raise DataError(f"{path}: holds no pictures, --{name.replace('_', '-')} is for them")
     if options.reference:
         given.reference = read_reference(options.reference)
         if not given.reference.has_position().any():
             raise DataError(f"{options.reference}: no positions in it")
     return given
+
+
+def _read_pictures(pictures: PictureInput, rig: libloc.Rig | None, options: argparse.Namespace) -> SlamInput:
+    """All but the pictures themselves."""
+    path = pictures.path
+    recording = None
+    if pictures.form == "euroc":
+        if rig is None:
+            rig = rig_of_euroc(path, options.camera)
+        recording = libloc.read_recording(path)
+    elif options.imu is not None:
+        recording = libloc.read_recording(options.imu)
+        if len(recording.imu.times_ns) == 0:
+            raise DataError(f"{options.imu}: no IMU samples in it")
+    if rig is None:
+        raise DataError(f"{path}: does not tell the camera's calibration: give --config")
+    imu = None if recording is None else recording.imu
+    reference = None
+    if recording is not None and not options.reference:
+        reference = _own_reference(options.imu or path, pictures.form, recording)
+    counts = {} if recording is None else dict(recording.counts)
+    return SlamInput(path, pictures.form, None, imu, rig, reference, counts, pictures=pictures)
+
+
+def _read_features(path: Path, rig: libloc.Rig | None, options: argparse.Namespace) -> SlamInput:
+    form = libloc.file_format(path)
+    if rig is None and form != "eqvio":
+        raise DataError(f"{path}: does not tell the camera's calibration: give --config")
+    if form == "tum" and _is_tracks_file(path):
+        assert rig is not None
+        if options.tracks is not None:
+            raise DataError(f"{path}: is a tracks file, --tracks is for recordings")
+        features, counts = _read_tracks(path, options, rig)
+        return SlamInput(path, "tracks", features, None, rig, None, counts)
+    recording, rig = _read_recording(path, form, rig, options.camera)
+    reference = None if options.reference else _own_reference(path, form, recording)
+    given = SlamInput(path, form, recording.features, recording.imu, rig, reference, recording.counts)
+    given.images = recording.images
+    if options.tracks is not None:
+        if options.start_time is None:
+            raise DataError(
+                f"{options.tracks}: a tracks file has no times: give --start-time, on the clock of {path}"
+            )
+        given.features, counts = _read_tracks(options.tracks, options, rig)
+        given.counts |= counts
+    else:
+        for name in ("rate_hz", "start_time"):
+            if getattr(options, name) is not None:
+                option = f"--{name.replace('_', '-')}"
+                raise DataError(f"{path}: is a recording with times of its own, {option} is for tracks files")
+    return given
+
+
+def _no_features(path: Path, given: SlamInput, camera: int) -> str:
+    cameras = sorted(set(given.features.camera.tolist()))
+    held = f"those of cameras {cameras}" if cameras else "none at all (--tracks takes them from another file)"
+    if given.images:
+        held += f", and {given.images} pictures, which are not searched for features"
+    return f"{path}: no features of camera {camera} in it; it holds {held}"
 
 
 def _parsed(old: Any, text: str) -> Any:
@@ -168,7 +205,7 @@ def _parsed(old: Any, text: str) -> Any:
     raise ValueError("cannot be set here")
 
 
-def set_option(options: SlamOptions, setting: str) -> None:
+def set_option(options: Any, setting: str, argument: str = "--set", kind: str = "SlamOptions") -> None:
     """NAME=VALUE, with names as in SlamOptions: map.max_features=60. Raises ValueError naming it."""
     name, separator, text = setting.partition("=")
     *outer, last = name.split(".")
@@ -176,11 +213,11 @@ def set_option(options: SlamOptions, setting: str) -> None:
     for part in outer:
         target = getattr(target, part, None)
     if not separator or not hasattr(target, last) or callable(getattr(target, last)):
-        raise ValueError(f"--set {setting}: must be NAME=VALUE, with a field of SlamOptions")
+        raise ValueError(f"{argument} {setting}: must be NAME=VALUE, with a field of {kind}")
     try:
         setattr(target, last, _parsed(getattr(target, last), text))
     except (TypeError, ValueError) as error:
-        raise ValueError(f"--set {setting}: {error}") from None
+        raise ValueError(f"{argument} {setting}: {error}") from None
 
 
 def slam_options(options: argparse.Namespace, given: SlamInput) -> SlamOptions:
@@ -193,6 +230,10 @@ def slam_options(options: argparse.Namespace, given: SlamInput) -> SlamOptions:
         out.imu_noise = given.rig.imu.noise
     if options.method is not None:
         out.motion = METHODS[options.method]
+    elif given.pictures is not None and options.slam_config is not None:
+        out.motion = libloc.read_slam_options(options.slam_config).motion
+    if given.pictures is not None:
+        out = libloc.slam_options_for_images(out)
     if options.slam_config is not None:
         out = libloc.read_slam_options(options.slam_config, out)
         if options.method is not None and out.motion != METHODS[options.method]:
@@ -209,6 +250,15 @@ def slam_options(options: argparse.Namespace, given: SlamInput) -> SlamOptions:
     out.check()
     if out.motion == SlamMotion.INERTIAL and (given.imu is None or len(given.imu.times_ns) == 0):
         raise DataError(f"{given.path}: no IMU samples in it, which inertial-slam needs")
+    return out
+
+
+def front_end_options(settings: list[str]) -> Any:
+    """FeatureTrackerOptions of NAME=VALUE. Raises ValueError naming one."""
+    out = libloc.FeatureTrackerOptions()
+    for setting in settings:
+        set_option(out, setting, "--front-end", "FeatureTrackerOptions")
+    out.check()
     return out
 
 

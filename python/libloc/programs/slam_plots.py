@@ -27,16 +27,16 @@ _SHOWN_WITHIN = 4
 _GAP = 5  # a step of time so many times the usual one is a hole in a line
 
 
-def _figure(width: float = 11, height: float = 5) -> Figure:
+def figure_of(width: float = 11, height: float = 5) -> Figure:
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
-def _legend(axes: Axes) -> None:
+def legend_above(axes: Axes, columns: int = 5) -> None:
     """Above the axes, where it hides nothing."""
     axes.legend(
-        loc="lower right", bbox_to_anchor=(1, 1), ncols=5, fontsize=9, frameon=False, borderaxespad=0.2
+        loc="lower right", bbox_to_anchor=(1, 1), ncols=columns, fontsize=9, frameon=False, borderaxespad=0.2
     )
 
 
@@ -47,7 +47,9 @@ class _Scene:
         run, truth = result.run, result.truth
         rows = known_rows(run)
         self.unit = result.unit
-        self.path = run.position[rows]
+        # Of what is compared with the truth.
+        camera = truth is not None and truth.camera
+        self.path = (run.camera_position if camera else run.position)[rows]
         self.reference = None if truth is None else truth.reference
         # Where the camera looks: the third axis of its frame.
         w, x, y, z = run.q_world_camera_wxyz[rows].T
@@ -103,7 +105,7 @@ def _ellipses(axes: Axes, centres: NDArray[np.float64], covariances: NDArray[np.
     )  # fmt: skip
 
 
-def _title(result: SlamResult) -> str:
+def title_of(result: SlamResult) -> str:
     if result.truth is None:
         return f"{result.method}: {len(result.run)} frames"
     error = result.truth.absolute
@@ -112,6 +114,22 @@ def _title(result: SlamResult) -> str:
         f"{result.method}: {error.translation.rmse:.4f} m rmse over {result.truth.length_m:.1f} m "
         f"({result.truth.mode}{scale})"
     )
+
+
+def draw_map_from_above(axes: Axes, result: SlamResult) -> None:
+    """Path, truth and map from above."""
+    scene = _Scene(result)
+    if scene.reference is not None:
+        axes.plot(*scene.reference[:, :2].T, color=_REFERENCE, lw=3, label="truth")
+    _ellipses(axes, scene.points[:, :2], scene.point_cov[:, :2, :2])
+    axes.scatter(*scene.points[:, :2].T, s=5, color=_MAP, lw=0, label=scene.map_label())
+    axes.plot(*scene.path[:, :2].T, color=_ESTIMATE, lw=1, label="estimate")
+    axes.plot(*scene.path[0, :2], "o", color="k", ms=5, label="start")
+    axes.plot(*scene.path[-1, :2], "X", color="k", ms=7, label="end")
+    axes.set(xlabel=f"x [{scene.unit}]", ylabel=f"y [{scene.unit}]", title="from above")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.grid(alpha=0.3)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=2, fontsize=8, frameon=False)
 
 
 def plot_top(result: SlamResult, path: Path) -> None:
@@ -123,7 +141,7 @@ def plot_top(result: SlamResult, path: Path) -> None:
     width = 9.0
     per_inch = max(spans[0] / width, spans[1] / 8, spans[2] / 6)
     heights = np.maximum(spans[1:] / per_inch, 1.5)
-    figure = _figure(width + 1, float(heights.sum()) + 2)
+    figure = figure_of(width + 1, float(heights.sum()) + 2)
     panels = figure.subplots(2, 1, sharex=True, height_ratios=heights)
     panels[0].set_xlim(centre[0] - width / 2 * per_inch, centre[0] + width / 2 * per_inch)
     for axes, height, middle in zip(panels, heights, centre[1:], strict=True):
@@ -152,14 +170,14 @@ def plot_top(result: SlamResult, path: Path) -> None:
     panels[1].set_title("from the side", fontsize=10)
     panels[1].set_xlabel(f"x [{scene.unit}]")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=9)
-    figure.suptitle(_title(result))
+    figure.suptitle(title_of(result))
     figure.savefig(path, dpi=110)
 
 
 def plot_space(result: SlamResult, path: Path) -> None:
     """Path and map in three dimensions; a point's bar is 1 sigma along its worst direction."""
     scene = _Scene(result)
-    figure = _figure(10, 7)
+    figure = figure_of(10, 7)
     axes: Any = figure.add_subplot(projection="3d")
     if scene.reference is not None:
         axes.plot(*scene.reference.T, color=_REFERENCE, lw=3, label="truth")
@@ -183,7 +201,7 @@ def plot_space(result: SlamResult, path: Path) -> None:
         artist.set_clip_on(False)  # the box is turned, and reaches beyond its axes
         artist.set_in_layout(False)
     figure.legend(loc="outside lower center", ncols=3, fontsize=9)
-    figure.suptitle(_title(result))
+    figure.suptitle(title_of(result))
     figure.savefig(path, dpi=110)
 
 
@@ -211,7 +229,7 @@ def _smoothed(values: NDArray[np.float64], width: int) -> NDArray[np.float64]:
 def plot_reprojection(result: SlamResult, path: Path) -> None:
     """Errors of what was used, before and after the update, over time."""
     run, t = result.run, _seconds(result)
-    figure = _figure(11, 4.2)
+    figure = figure_of(11, 4.2)
     axes = figure.subplots()
     for name, colour in (("before", _MAP), ("after", _ESTIMATE)):
         values = getattr(run, f"reprojection_{name}_px")
@@ -225,7 +243,7 @@ def plot_reprojection(result: SlamResult, path: Path) -> None:
     else:
         axes.set_ylim(0, None)
     axes.set(xlabel="time since the first frame [s]", ylabel="rms of |measured - predicted| in a frame [px]")
-    _legend(axes)
+    legend_above(axes)
     axes.grid(alpha=0.3)
     figure.suptitle("reprojection error")
     figure.savefig(path, dpi=110)
@@ -234,7 +252,7 @@ def plot_reprojection(result: SlamResult, path: Path) -> None:
 def plot_features(result: SlamResult, path: Path) -> None:
     """Numbers of features, what came and went, and the time that it took."""
     run, t = result.run, _seconds(result)
-    figure = _figure(11, 8)
+    figure = figure_of(11, 8)
     upper, middle, lower = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 1.5))
     for name, label, colour in (
         ("in_frame", "in the frame", _REFERENCE),
@@ -246,7 +264,7 @@ def plot_features(result: SlamResult, path: Path) -> None:
     rejected = run.counts["rejected"]
     upper.plot(t, rejected, color="tab:red", lw=0.8, label=f"not believed ({rejected.sum()} in all)")
     upper.set(ylabel="features", ylim=(0, None))
-    _legend(upper)
+    legend_above(upper)
     for name, label, colour in (
         ("added", "added", _ESTIMATE),
         ("converted", "became XYZ", _OTHER),
@@ -255,13 +273,13 @@ def plot_features(result: SlamResult, path: Path) -> None:
         values = np.cumsum(run.counts[name])
         middle.plot(t, values, color=colour, lw=1, label=f"{label}, {values[-1]}")
     middle.set(ylabel="since the start", ylim=(0, None))
-    _legend(middle)
+    legend_above(middle)
     ms = 1e3 * run.time_spent_s
     lower.plot(t, ms, color=_ESTIMATE, lw=0.6, label=f"mean {ms.mean():.2f} ms")
     lower.set(
         xlabel="time since the first frame [s]", ylabel="filter [ms]", ylim=(0, 1.3 * np.percentile(ms, 99.5))
     )
-    _legend(lower)
+    legend_above(lower)
     for axes in (upper, middle, lower):
         axes.grid(alpha=0.3)
     figure.suptitle("features")
@@ -280,7 +298,7 @@ def plot_nis(result: SlamResult, path: Path) -> None:
     used = run.nis_dim > 0
     ratio = np.where(used, run.nis / np.maximum(run.nis_dim, 1), np.nan)
     bounds = np.array([_nis_bounds(int(d)) if d > 0 else (np.nan, np.nan) for d in run.nis_dim])
-    figure = _figure(11, 4.2)
+    figure = figure_of(11, 4.2)
     axes = figure.subplots()
     axes.fill_between(
         t, bounds[:, 0], bounds[:, 1], color="0.88", lw=0, label="95 % of a consistent filter's"
@@ -291,7 +309,7 @@ def plot_nis(result: SlamResult, path: Path) -> None:
     finite = ratio[np.isfinite(ratio)]
     top = max(2.0, 1.2 * float(np.percentile(finite, 99))) if len(finite) else 2.0
     axes.set(xlabel="time since the first frame [s]", ylabel="NIS per dimension", ylim=(0, top))
-    _legend(axes)
+    legend_above(axes)
     axes.grid(alpha=0.3)
     inside = np.mean((finite > bounds[used, 0]) & (finite < bounds[used, 1])) if len(finite) else np.nan
     figure.suptitle(
@@ -306,7 +324,7 @@ def plot_error(result: SlamResult, path: Path) -> None:
     assert truth is not None
     t = (truth.times_ns - result.run.time_ns[0]) * 1e-9
     error = truth.estimate - truth.reference
-    figure = _figure(11, 9)
+    figure = figure_of(11, 9)
     panels = figure.subplots(4, 1, sharex=True)
     for k, axes in enumerate(panels[:3]):
         band = 3 * truth.sigma[:, k]
@@ -315,23 +333,23 @@ def plot_error(result: SlamResult, path: Path) -> None:
         reach = 1.3 * max(float(np.abs(error[:, k]).max()), 1e-6)
         reach = max(reach, min(1.1 * float(band.max()), 4 * reach))  # a wide band must not flatten the error
         axes.set(ylabel=f"{_AXES[k]} [m]", ylim=(-reach, reach))
-    _legend(panels[0])
+    legend_above(panels[0])
     distance = truth.absolute.translation_m
     panels[3].plot(t, _with_holes(t, distance), color=_ESTIMATE, lw=0.9, label="distance from the true place")
     running = np.sqrt(np.cumsum(distance**2) / np.arange(1, len(distance) + 1))
     panels[3].plot(t, running, color="k", lw=1.2, label="rms so far")
     panels[3].set(xlabel="time since the first frame [s]", ylabel="error [m]", ylim=(0, None))
-    _legend(panels[3])
+    legend_above(panels[3])
     for axes in panels:
         axes.grid(alpha=0.3)
-    figure.suptitle("error of the place, " + _title(result))
+    figure.suptitle("error of the place, " + title_of(result))
     figure.savefig(path, dpi=110)
 
 
 def plot_inertial(result: SlamResult, path: Path) -> None:
     """Velocity and biases over time with their 3 sigma."""
     run, t = result.run, _seconds(result)
-    figure = _figure(11, 8)
+    figure = figure_of(11, 8)
     panels = figure.subplots(3, 1, sharex=True)
     sigma = np.sqrt(np.maximum(np.diagonal(run.covariance, axis1=1, axis2=2), 0))
     for axes, name, first, unit in (
@@ -349,7 +367,7 @@ def plot_inertial(result: SlamResult, path: Path) -> None:
         reach = np.nanmax(np.abs(values[late]) + 3 * sigma[late, first : first + 3])
         axes.set(ylabel=f"{name.replace('_', ' ')} [{unit}]", ylim=(-1.1 * reach, 1.1 * reach))
         axes.grid(alpha=0.3)
-    _legend(panels[0])
+    legend_above(panels[0])
     panels[2].set_xlabel("time since the first frame [s]")
     figure.suptitle("velocity in world and biases of the IMU, with 3 sigma")
     figure.savefig(path, dpi=110)
@@ -368,6 +386,10 @@ def write_pictures(result: SlamResult, folder: Path) -> list[Path]:
         pictures["inertial.png"] = plot_inertial
     if result.truth is not None:
         pictures["error.png"] = plot_error
+    if result.front_end is not None:
+        from libloc.programs.slam_picture_plots import plot_summary
+
+        pictures["summary.png"] = plot_summary
     for name, draw in pictures.items():
         draw(result, folder / name)
     return [folder / name for name in pictures]

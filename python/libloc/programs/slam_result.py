@@ -15,6 +15,7 @@ import libloc
 from libloc import EstimateStatus, EstimateValid, SlamRun
 from libloc.programs.evaluate_input import Poses
 from libloc.programs.slam_input import SlamInput
+from libloc.programs.slam_pictures import Watcher, at_frames, profile, whole_s
 
 _FAR = 1e9  # [m]: what is farther is as good as at infinity
 
@@ -32,6 +33,7 @@ class TruthResult:
     sigma: NDArray[np.float64]  # (N, 3), deviations that the filter states, in the reference's axes [m]
     without_partner: int
     length_m: float  # of the true path
+    camera: bool = False  # poses of the camera are compared, not of body
 
     def to_reference(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
         alignment = self.absolute.alignment
@@ -53,6 +55,10 @@ class SlamResult:
     truth: TruthResult | None
     truth_failure: str  # why there is none though there is a reference
     elapsed_s: float
+    front_end: dict[str, NDArray[Any]] | None = (
+        None  # from pictures: a row for each, see ImageSlam.recorded()
+    )
+    watcher: Watcher | None = None
 
     @property
     def unit(self) -> str:
@@ -69,8 +75,23 @@ def known_rows(run: SlamRun) -> NDArray[np.bool]:
     return (run.valid & wanted) == wanted
 
 
-def against_truth(run: SlamRun, reference: Poses, mode: str, metric: bool) -> TruthResult:
-    """Raises DataError when nothing pairs, or the poses do not determine the alignment."""
+def _cameras(body: libloc.Trajectory, T_body_camera: libloc.Pose3) -> libloc.Trajectory:
+    """The camera's poses where body has these."""
+    poses = [
+        libloc.Pose3(q, p) * T_body_camera for q, p in zip(body.q_world_body_wxyz, body.position, strict=True)
+    ]
+    q = np.array([pose.rotation_wxyz for pose in poses])
+    return libloc.Trajectory(body.times_ns, q, np.array([pose.translation for pose in poses]))
+
+
+def against_truth(
+    run: SlamRun, reference: Poses, mode: str, metric: bool, T_body_camera: libloc.Pose3
+) -> TruthResult:
+    """reference: poses of body. Where lengths are not metres the camera is compared: how far it is from body
+    is then known in metres only.
+
+    Raises DataError when nothing pairs, or the poses do not determine the alignment.
+    """
     if mode == "auto":
         mode = "se3" if metric else "sim3"
     rows = np.flatnonzero(known_rows(run))
@@ -79,8 +100,14 @@ def against_truth(run: SlamRun, reference: Poses, mode: str, metric: bool) -> Tr
         raise libloc.DataError(
             f"{len(rows)} estimates and {truth.sum()} true poses are too few to be compared"
         )
-    estimate = libloc.Trajectory(run.time_ns[rows], run.q_world_body_wxyz[rows], run.position[rows])
     true_path = reference.trajectory(truth)
+    if metric:
+        estimate = libloc.Trajectory(run.time_ns[rows], run.q_world_body_wxyz[rows], run.position[rows])
+    else:
+        estimate = libloc.Trajectory(
+            run.time_ns[rows], run.q_world_camera_wxyz[rows], run.camera_position[rows]
+        )
+        true_path = _cameras(true_path, T_body_camera)
     spacing_ns = int(np.median(np.diff(true_path.times_ns))) if len(true_path) > 1 else 0
     pairs = libloc.associate(
         estimate,
@@ -101,6 +128,7 @@ def against_truth(run: SlamRun, reference: Poses, mode: str, metric: bool) -> Tr
         sigma=np.empty(0),
         without_partner=pairs.without_partner,
         length_m=float(np.linalg.norm(np.diff(pairs.reference.position, axis=0), axis=1).sum()),
+        camera=not metric,
     )
     out.estimate = out.to_reference(pairs.estimate.position)
     covariance = out.covariance_to_reference(run.covariance[rows, 3:6, 3:6])
@@ -165,6 +193,13 @@ def report(result: SlamResult) -> dict[str, Any]:
             if np.any(run.status & flag)
         },
     }
+    if result.front_end is not None:
+        pictures = result.front_end
+        out["pictures"] = {
+            name: int(pictures[name].sum())
+            for name in ("tracks", "searched", "klt", "cut_anew", "refound", "new", "lost")
+        } | {"count": len(pictures["time_ns"])}
+        out["profile_ms"] = profile(run, pictures)
     if result.truth is not None:
         truth = result.truth
         error = truth.absolute
@@ -173,6 +208,7 @@ def report(result: SlamResult) -> dict[str, Any]:
         out["truth"] = {
             "file": str(given.reference.path) if given.reference else None,
             "alignment": truth.mode,
+            "pose": "camera" if truth.camera else "body",
             "scale": error.alignment.scale,
             "pairs": len(truth.rows),
             "without_partner": truth.without_partner,
@@ -203,7 +239,28 @@ _TROUBLE = (
 
 def _troubles(out: dict[str, Any]) -> list[str]:
     counts = out["input"]["counts"] | out["estimator"]
-    return [f"{name} {n}" for name, n in counts.items() if n and any(word in name for word in _TROUBLE)]
+    # What becomes of a track is no trouble, and has a line of its own.
+    return [
+        f"{name} {n}"
+        for name, n in counts.items()
+        if n and not name.startswith("tracks.") and any(word in name for word in _TROUBLE)
+    ]
+
+
+def _lines_of_pictures(out: dict[str, Any]) -> list[str]:
+    p = out["pictures"]
+    n = max(p["count"], 1)
+    lines = [
+        f"{'features':14s} {p['tracks'] / n:.1f} in a picture: {p['searched'] / n:.1f} where expected, "
+        f"{(p['klt'] + p['cut_anew']) / n:.1f} from the last picture, {p['refound'] / n:.1f} found again, "
+        f"{p['new'] / n:.1f} new; {p['lost'] / n:.1f} lost"
+    ]
+    lines += [f"{'time [ms]':14s} {'':10s} {'median':>8s} {'99 %':>8s} {'longest':>8s}"]
+    for name, ms in out["profile_ms"].items():
+        if ms is not None:
+            part = name.replace("_", " ") if name in ("front_end", "filter", "whole") else f"  {name}"
+            lines.append(f"{'':14s} {part:10s} {ms['median']:8.2f} {ms['p99']:8.2f} {ms['max']:8.2f}")
+    return lines
 
 
 def text_of(out: dict[str, Any]) -> str:
@@ -223,6 +280,8 @@ def text_of(out: dict[str, Any]) -> str:
     unit = "m" if out["metric"] else "units of its own: one camera cannot tell metres"
     line("method", f"{out['method']}, {out['first_time_s']} to {out['last_time_s']} s")
     line("path", f"{out['path_length']:.3f} {unit}")
+    if "pictures" in out:
+        lines += _lines_of_pictures(out)
     ms = out["filter_ms_per_frame"]
     line("filter", f"{ms['mean']:.3f} ms a frame, 95 % below {ms['p95']:.3f}, longest {ms['max']:.3f}")
     px = out["reprojection_px"]
@@ -255,8 +314,11 @@ def _vector(prefix: str, unit: str, axes: str = "xyz") -> list[str]:
     return [f"{prefix}{axis}{unit}" for axis in axes]
 
 
-def frame_columns(run: SlamRun) -> dict[str, NDArray[Any]]:
-    """Everything that SlamFrame says, by the names of the columns; those of the pose are loc-estimator's."""
+def frame_columns(run: SlamRun, front_end: dict[str, NDArray[Any]] | None = None) -> dict[str, NDArray[Any]]:
+    """Everything that SlamFrame says, by the names of the columns; those of the pose are loc-estimator's.
+
+    From pictures those of the front end follow.
+    """
     out: dict[str, NDArray[Any]] = {
         "time_ns": run.time_ns,
         "sequence": run.sequence,
@@ -285,12 +347,20 @@ def frame_columns(run: SlamRun) -> dict[str, NDArray[Any]]:
         out[name] = getattr(run, name)
     out.update(run.counts)
     out["time_spent_s"] = run.time_spent_s
+    if front_end is not None:
+        for name in ("tracks", "searched", "klt", "cut_anew", "refound", "new", "lost"):
+            # Every frame has its picture, so that this is exact.
+            out[f"tracks_{name}" if name != "tracks" else name] = at_frames(run, front_end, name).astype(
+                np.int64
+            )
+        out["front_end_s"] = at_frames(run, front_end, "front_end_s")
+        out["whole_s"] = whole_s(run, front_end)
     return out
 
 
-def write_frames(run: SlamRun, path: Path) -> None:
+def write_frames(run: SlamRun, path: Path, front_end: dict[str, NDArray[Any]] | None = None) -> None:
     """CSV, a line for each frame; every number reads back as the same one, an empty cell is not known."""
-    columns = frame_columns(run)
+    columns = frame_columns(run, front_end)
     cells = [
         [str(v) for v in values.tolist()]
         if values.dtype.kind in "iu"
@@ -339,7 +409,7 @@ def write(result: SlamResult, out: dict[str, Any], pose: str, pictures: bool, fo
         return paths
     for name, function in (
         ("trajectory.tum", lambda path: write_trajectory(result.run, pose, path)),
-        ("frames.csv", lambda path: write_frames(result.run, path)),
+        ("frames.csv", lambda path: write_frames(result.run, path, result.front_end)),
         ("map.ply", lambda path: write_map(result, path)),
         ("slam.yaml", lambda path: libloc.write_slam_options(path, result.options)),
         ("state.slam", lambda path: libloc.save_slam(path, result.run.snapshot, result.options)),
@@ -350,4 +420,6 @@ def write(result: SlamResult, out: dict[str, Any], pose: str, pictures: bool, fo
         from libloc.programs import slam_plots
 
         paths += slam_plots.write_pictures(result, folder)
+    if result.watcher is not None and result.watcher.video_path is not None:
+        paths.append(result.watcher.video_path)
     return paths
