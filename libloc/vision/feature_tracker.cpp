@@ -29,6 +29,7 @@ constexpr double kKltDisagrees = 1.5;  // two ways from the last picture to this
 constexpr int kMostKltSteps = 20;
 constexpr double kKltConverged = 0.03;  // [px]
 constexpr double kKltEigenvalue = 1e-3;
+constexpr double kVagueGuess = 60;  // deviation of a place that is no guess any more [px]
 constexpr double kTwins = 5;        // two tracks nearer than this are one feature [px]
 constexpr int kBrightnessStep = 4;  // every so many pixels count for the mean brightness
 constexpr double kBorder = kPatchHalf + 2;
@@ -134,6 +135,7 @@ struct FeatureTracker::Work {
   CornerOptions corner_options;
   cv::Mat gray;
   cv::Mat before_gray;
+  Brightness brightness;
   Brightness before_brightness;
   std::vector<cv::Mat> pyramid;
   std::vector<cv::Mat> before_pyramid;
@@ -163,6 +165,7 @@ struct FeatureTracker::Work {
   std::int64_t lost = 0;
   std::int64_t moving = 0;
   std::int64_t exposure_steps = 0;
+  std::int64_t blind = 0;
 
   GrayView view() const { return {gray.data, gray.cols, gray.rows, static_cast<int>(gray.step)}; }
   GrayView before_view() const {
@@ -178,7 +181,10 @@ struct FeatureTracker::Work {
   void confirm(Track& track, const Eigen::Vector2d& place, const SlamPrediction* expected);
   bool cut(Track& track, const Eigen::Vector2d& place, const SlamPrediction* expected) const;
   void remove_twins();
+  bool is_blind() const;
+  void forget_picture();
   void detect(const SlamPrediction* expected);
+  void out_without(const ImageMeasurement& image);
   void give_out(const ImageMeasurement& image);
 };
 
@@ -189,6 +195,7 @@ void FeatureTracker::Work::take_picture(const ImageMeasurement& image) {
               std::to_string(camera.width_px()) + " x " + std::to_string(camera.height_px()));
   std::swap(gray, before_gray);
   std::swap(pyramid, before_pyramid);
+  std::swap(brightness, before_brightness);
   if (seen.channels() == 1) {
     seen.copyTo(gray);
   } else {
@@ -196,8 +203,9 @@ void FeatureTracker::Work::take_picture(const ImageMeasurement& image) {
   }
   const cv::Size window(options.klt_window_px, options.klt_window_px);
   cv::buildOpticalFlowPyramid(gray, pyramid, window, options.klt_levels - 1, true);
-  const Brightness now = brightness_of(gray);
-  const Brightness was = std::exchange(before_brightness, now);
+  brightness = brightness_of(gray);
+  const Brightness& now = brightness;
+  const Brightness& was = before_brightness;
   const bool step = picture > 0 && std::abs(now.mean - was.mean) > options.exposure_step * std::max(now.mean, was.mean);
   if (step && was.deviation > 1 && now.deviation > 1) {
     // The picture before as it would be with this exposure.
@@ -288,7 +296,11 @@ bool FeatureTracker::Work::search(Track& track, const SlamPrediction* expected) 
 }
 
 Eigen::Vector2d FeatureTracker::Work::guess_of(const Track& track, const SlamPrediction* expected) const {
-  if (track.expected != nullptr && track.expected->visible) return track.expected->pixel_px;
+  // After a while without pictures an expectation may say less than the last place.
+  const bool says =
+      track.expected != nullptr && track.expected->visible && largest_sigma(track.expected->search_cov) < kVagueGuess;
+  if (says) return track.expected->pixel_px;
+  if (track.expected != nullptr && track.expected->visible) return track.last_px;
   if (expected != nullptr && expected->valid && has_before_pose) {
     // Not in the map: as if it were far away.
     const auto ray = camera.unproject(track.last_px);
@@ -390,12 +402,33 @@ void FeatureTracker::Work::detect(const SlamPrediction* expected) {
   }
 }
 
-void FeatureTracker::Work::give_out(const ImageMeasurement& image) {
+// Nothing in it: the lens is covered, or all is black or white.
+bool FeatureTracker::Work::is_blind() const {
+  return !tracks.empty() && std::none_of(tracks.begin(), tracks.end(), [](const Track& track) { return track.seen; });
+}
+
+// As if it had not come: the next one goes on from the picture before.
+void FeatureTracker::Work::forget_picture() {
+  std::swap(gray, before_gray);
+  std::swap(pyramid, before_pyramid);
+  std::swap(brightness, before_brightness);
+  for (Track& track : tracks) {
+    track.seen = track.was_seen;
+    track.pixel_px = track.last_px;
+  }
+  ++blind;
+}
+
+void FeatureTracker::Work::out_without(const ImageMeasurement& image) {
   static_cast<Stamp&>(out) = image;
   out.camera = image.camera;
   out.sigma_px = options.sigma_px;
   out.features.clear();
   tracked.clear();
+}
+
+void FeatureTracker::Work::give_out(const ImageMeasurement& image) {
+  out_without(image);
   for (Track& track : tracks) {
     if (!track.seen) {
       if (track.was_seen) ++lost;
@@ -446,9 +479,14 @@ const FeaturesMeasurement& FeatureTracker::track(const ImageMeasurement& image, 
   w.detect(expected);
   w.times.detect_s = seconds_since(detect_begin);
 
-  w.give_out(image);
-  w.has_before_pose = expected != nullptr;
-  if (expected != nullptr) w.T_world_before = expected->T_world_camera;
+  if (w.is_blind()) {
+    w.out_without(image);
+    w.forget_picture();
+  } else {
+    w.give_out(image);
+    w.has_before_pose = expected != nullptr;
+    if (expected != nullptr) w.T_world_before = expected->T_world_camera;
+  }
   w.times.total_s = seconds_since(begin);
   return w.out;
 }
@@ -491,11 +529,11 @@ const FeatureTrackerOptions& FeatureTracker::options() const {
 
 NamedCounts FeatureTracker::counts() const {
   const Work& w = *work_;
-  return {{"pictures", w.picture},       {"pictures.exposure_steps", w.exposure_steps},
-          {"tracks.new", w.added},       {"tracks.searched", w.searched},
-          {"tracks.klt", w.tracked_klt}, {"tracks.cut_anew", w.cut_anew},
-          {"tracks.refound", w.refound}, {"tracks.lost", w.lost},
-          {"tracks.moving", w.moving}};
+  return {{"pictures", w.picture},         {"pictures.exposure_steps", w.exposure_steps},
+          {"pictures.blind", w.blind},     {"tracks.new", w.added},
+          {"tracks.searched", w.searched}, {"tracks.klt", w.tracked_klt},
+          {"tracks.cut_anew", w.cut_anew}, {"tracks.refound", w.refound},
+          {"tracks.lost", w.lost},         {"tracks.moving", w.moving}};
 }
 
 }  // namespace loc

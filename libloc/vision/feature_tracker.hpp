@@ -10,6 +10,8 @@
 //      looks like the feature is cut anew where the feature is now.
 //   3. features of the map that were lost or come back into view: as 1, with a stricter correlation
 //   4. corners in cells of the picture that have none (FAST, then the smaller eigenvalue of Shi and Tomasi)
+// A picture in which nothing is found, neither tracks nor corners, counts as one that did not come: the next one goes on
+// from the picture before it.
 // What the filter rejects several times in a row is taken for something that moves by itself: its track ends, and for a
 // while no new one begins there. A change of exposure is taken out before 2; 1 and 3 do not feel it.
 // Frames: pixels as in patch.hpp, distorted, as the camera sees them. Identities are never used twice. Not thread safe.
@@ -100,7 +102,7 @@ class FeatureTracker {
   const std::vector<TrackedFeature>& last() const;
   const FeatureTrackerTimes& times() const;
   /// "tracks.searched", "tracks.klt", "tracks.cut_anew", "tracks.refound", "tracks.new", "tracks.lost",
-  /// "tracks.moving", "pictures", "pictures.exposure_steps".
+  /// "tracks.moving", "pictures", "pictures.exposure_steps", "pictures.blind" (nothing in them).
   NamedCounts counts() const;
   const FeatureTrackerOptions& options() const;
 

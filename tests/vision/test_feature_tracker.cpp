@@ -430,8 +430,13 @@ TEST(FeatureTracker, PicturesWithoutAnythingGiveNoTracks) {
   for (const double value : {0.0, 255.0, 0.0}) {
     const ImageMeasurement flat = test::changed(image, [&](double, int, int) { return value; });
     EXPECT_TRUE(tracker.track(flat).features.empty()) << value;
+    EXPECT_TRUE(tracker.last().empty());
   }
-  EXPECT_EQ(count_of(tracker.counts(), "tracks.lost"), first_lot);
+  // They count as pictures that did not come: all tracks go on.
+  EXPECT_EQ(count_of(tracker.counts(), "pictures.blind"), 3);
+  EXPECT_EQ(count_of(tracker.counts(), "tracks.lost"), 0);
+  EXPECT_GE(static_cast<std::int64_t>(tracker.track(image).features.size()), first_lot);
+  EXPECT_LE(count_of(tracker.counts(), "tracks.lost"), 1);
   // Noise has corners, but none of them is there in the next picture.
   std::int64_t old = 0;
   for (int i = 0; i < 4; ++i) {
@@ -440,6 +445,7 @@ TEST(FeatureTracker, PicturesWithoutAnythingGiveNoTracks) {
     for (const TrackedFeature& one : tracker.last()) old += one.age > 0 ? 1 : 0;
   }
   EXPECT_LE(old, 2);
+  EXPECT_GE(count_of(tracker.counts(), "tracks.lost"), first_lot);
   // And the room is taken up again, with identities that are all new.
   for (const FeatureObservation& feature : tracker.track(image).features) EXPECT_GE(feature.id, first_lot);
 }
@@ -548,22 +554,31 @@ TEST(ImageSlam, PicturesThatComeLateOrTwiceAreNotUsedAndTheNextOneIs) {
   EXPECT_GT(slam.slam().frame().counts.measured, 20);
 }
 
-TEST(ImageSlam, ActiveSearchTakesOverOnceTheMapIsKnown) {
+TEST(ImageSlam, SearchesByTheMapAndFindsAgainWhatWasHiddenOrDark) {
   RoomCamera room(test::small_camera());
   ImageSlam<MonoSlam> slam(slam_options(room.calibration()));
   for (int i = 0; i < 30; ++i) slam.process(room.at(test::swaying(0.05 * i), i * kFrameNs));
   int searched = 0;
   for (const TrackedFeature& one : slam.tracker().last()) searched += one.origin == TrackOrigin::kSearched ? 1 : 0;
   EXPECT_GT(searched, 25);
-  // Lost for a picture: found again as what they were.
-  const ImageMeasurement black = test::changed(room.at(test::swaying(0), 0), [](double, int, int) { return 0.0; });
-  ImageMeasurement dark = black;
-  dark.time_ns = 30 * kFrameNs;
-  slam.process(dark);
-  EXPECT_TRUE(slam.features().features.empty());
+  // Half of them hidden for a while: found again as what they were.
+  const auto wall = [](double v, int x, int) { return x < 190 ? 90 : v; };
+  for (int i = 30; i < 36; ++i) slam.process(test::changed(room.at(test::swaying(0.05 * i), i * kFrameNs), wall));
   const std::int64_t before = count_of(slam.counts(), "tracks.refound");
-  slam.process(room.at(test::swaying(0.05 * 31), 31 * kFrameNs));
-  EXPECT_GT(count_of(slam.counts(), "tracks.refound") - before, 15);
+  slam.process(room.at(test::swaying(0.05 * 36), 36 * kFrameNs));
+  EXPECT_GT(count_of(slam.counts(), "tracks.refound") - before, 10);
+  // Black for half a second: the tracks from before go on.
+  std::set<std::int64_t> ids;
+  for (const FeatureObservation& feature : slam.features().features) ids.insert(feature.id);
+  for (int i = 37; i < 47; ++i) {
+    slam.process(test::brightened(room.at(test::swaying(0.05 * i), i * kFrameNs), 0));
+    EXPECT_TRUE(slam.features().features.empty());
+  }
+  slam.process(room.at(test::swaying(0.05 * 47), 47 * kFrameNs));
+  int same = 0;
+  for (const FeatureObservation& feature : slam.features().features) same += ids.contains(feature.id) ? 1 : 0;
+  EXPECT_GT(same, 60);
+  EXPECT_GT(slam.slam().frame().counts.measured, 25);
   slam.reset();
   EXPECT_TRUE(slam.process(room.at(test::swaying(0), 0)));
 }
