@@ -1,19 +1,34 @@
 // Images: time to find a calibration target in a picture (752 x 480), and to calibrate a camera; OpenCV's own searches
 // and solvers on the same input beside them. Counters: corners found, their rms error [px], rms residual [px].
+// Front end and SLAM from pictures of a rendered room (752 x 480, 100 tracks, 20 Hz): one iteration is one picture.
+// Counters: median and 99th percentile of a picture's parts [ms], tracks in a picture, and the rms distance of the
+// tracks from the projection of the point where they began [px]. OpenCV's chain beside it: goodFeaturesToTrack and
+// pyramidal Lucas-Kanade there and back with the same number of points.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <map>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "libloc/calib/camera_intrinsics.hpp"
 #include "libloc/core/random.hpp"
+#include "libloc/core/statistics.hpp"
 #include "libloc/geometry/camera.hpp"
 #include "libloc/sim/calibration_target.hpp"
 #include "libloc/sim/scene_renderer.hpp"
+#include "libloc/vision/image_slam.hpp"
 #include "libloc/vision/image_view.hpp"
 #include "libloc/vision/target_detector.hpp"
 #include "support/camera_models.hpp"
+#include "support/rendered_ride.hpp"
 
 namespace {
 
@@ -187,6 +202,231 @@ void opencv_calibrate(benchmark::State& state) {
   state.counters["rms_px"] = rms;
 }
 
+// Front end
+
+constexpr int kRide = 200;  // pictures; the first ones are not measured
+constexpr int kWarmUp = 20;
+constexpr int kTracks = 100;
+
+struct RoomPicture {
+  ImageMeasurement image;
+  Pose3 pose;
+};
+const std::vector<RoomPicture>& room_ride() {
+  static const std::vector<RoomPicture> kPictures = [] {
+    std::vector<RoomPicture> out;
+    loc::test::RoomCamera room(loc::test::radtan_camera(), 2);
+    for (int i = 0; i < kRide; ++i) {
+      const Pose3 pose = loc::test::swaying(0.05 * i);
+      out.push_back({room.at(pose, i * loc::TimeNs{50'000'000}), pose});
+    }
+    return out;
+  }();
+  return kPictures;
+}
+
+/// Distances of tracks from the projections of the points where they began.
+class TrackErrors {
+ public:
+  void add(std::int64_t id, const Eigen::Vector2d& pixel_px, const Pose3& pose) {
+    if (const auto found = began_.find(id); found != began_.end()) {
+      const auto truth = camera_.project(pose.inverse() * found->second);
+      if (!truth) return;
+      squares_ += (pixel_px - *truth).squaredNorm();
+      ++count_;
+    } else if (const auto ray = camera_.unproject(pixel_px)) {
+      began_[id] = loc::test::on_wall(pose, *ray);
+    }
+  }
+  double rms() const { return std::sqrt(squares_ / std::max(count_, 1.0)); }
+
+ private:
+  loc::Camera camera_{loc::test::radtan_camera()};
+  std::map<std::int64_t, Eigen::Vector3d> began_;
+  double squares_ = 0;
+  double count_ = 0;
+};
+
+void put_quantiles(benchmark::State& state, const std::string& name, const std::vector<double>& seconds) {
+  if (seconds.empty()) return;
+  state.counters[name + "_median"] = 1e3 * loc::quantile(seconds, 0.5);
+  state.counters[name + "_p99"] = 1e3 * loc::quantile(seconds, 0.99);
+}
+
+struct Parts {
+  std::vector<double> pyramid, search, klt, detect, front, filter, whole;
+
+  void add(const loc::FeatureTrackerTimes& times) {
+    pyramid.push_back(times.pyramid_s);
+    search.push_back(times.search_s);
+    klt.push_back(times.klt_s);
+    detect.push_back(times.detect_s);
+    front.push_back(times.total_s);
+  }
+  void put(benchmark::State& state) const {
+    put_quantiles(state, "pyramid", pyramid);
+    put_quantiles(state, "search", search);
+    put_quantiles(state, "klt", klt);
+    put_quantiles(state, "detect", detect);
+    put_quantiles(state, "front", front);
+    put_quantiles(state, "filter", filter);
+    put_quantiles(state, "whole", whole);
+  }
+};
+
+double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+/// The tracker alone, without expectations.
+void track_features(benchmark::State& state) {
+  cv::setNumThreads(1);
+  const auto& pictures = room_ride();
+  loc::FeatureTracker tracker(loc::test::radtan_camera(), {.max_tracks = kTracks});
+  Parts parts;
+  TrackErrors errors;
+  double tracks = 0;
+  std::size_t next = 0;
+  for (auto _ : state) {
+    const RoomPicture& one = pictures[next % pictures.size()];
+    const auto& features = tracker.track(one.image);
+    state.PauseTiming();
+    if (next < pictures.size()) {  // then the ride jumps back to its beginning
+      for (const auto& f : features.features) errors.add(f.id, f.pixel_px, one.pose);
+    }
+    if (next++ >= kWarmUp) parts.add(tracker.times());
+    tracks += static_cast<double>(features.features.size());
+    if (next % pictures.size() == 0) tracker.reset();
+    state.ResumeTiming();
+  }
+  parts.put(state);
+  state.counters["tracks"] = tracks / static_cast<double>(next);
+  state.counters["error_px"] = errors.rms();
+}
+
+/// With the filter, which tells where to look.
+template <class Slam>
+void slam_from_pictures(benchmark::State& state) {
+  cv::setNumThreads(1);
+  const auto& pictures = room_ride();
+  loc::SlamOptions options;
+  options.camera = loc::test::radtan_camera();
+  if (std::is_same_v<Slam, loc::InertialSlam>) {
+    options.motion = loc::SlamMotion::kInertial;
+    options.imu_sampling = loc::ImuSampling::kPoint;
+  }
+  loc::ImageSlam<Slam> slam(loc::slam_options_for_images(options), {.max_tracks = kTracks});
+  Parts parts;
+  double tracks = 0;
+  std::size_t next = 0;
+  // A frame is done with the sample after it.
+  const auto keep_filter_times = [&] {
+    if constexpr (std::is_same_v<Slam, loc::MonoSlam>) {
+      parts.filter.push_back(slam.slam().frame().time_spent_s);
+    } else {
+      for (const loc::SlamFrame& frame : slam.slam().frames()) parts.filter.push_back(frame.time_spent_s);
+    }
+  };
+  for (auto _ : state) {
+    const std::size_t i = next % pictures.size();
+    double seconds = 0;
+    if (std::is_same_v<Slam, loc::InertialSlam>) {
+      // Samples of the 50 ms before, by central differences of the ride.
+      for (int k = 9; k >= 0; --k) {
+        state.PauseTiming();
+        const loc::ImuMeasurement sample =
+            loc::test::imu_of(loc::test::swaying, 0.05 * static_cast<double>(i) - 0.005 * k);
+        state.ResumeTiming();
+        const auto begin = std::chrono::steady_clock::now();
+        slam.process(sample);
+        seconds += seconds_since(begin);
+        keep_filter_times();
+      }
+    }
+    const auto begin = std::chrono::steady_clock::now();
+    slam.process(pictures[i].image);
+    seconds += seconds_since(begin);
+    state.PauseTiming();
+    tracks += static_cast<double>(slam.features().features.size());
+    if (next++ >= kWarmUp) {
+      parts.add(slam.tracker().times());
+      parts.whole.push_back(seconds);
+      keep_filter_times();
+    }
+    if (next % pictures.size() == 0) slam.reset();
+    state.ResumeTiming();
+  }
+  parts.put(state);
+  state.counters["tracks"] = tracks / static_cast<double>(next);
+}
+
+/// As OpenCV's own example tracks: corners when there are fewer than there should be, Lucas-Kanade there and back.
+void opencv_track_features(benchmark::State& state) {
+  cv::setNumThreads(1);
+  const auto& pictures = room_ride();
+  const cv::Size window(21, 21);
+  const cv::TermCriteria until(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 20, 0.03);
+  std::vector<cv::Point2f> points;
+  std::vector<std::int64_t> ids;
+  std::int64_t next_id = 0;
+  std::vector<double> seconds;
+  TrackErrors errors;
+  double tracks = 0;
+  std::size_t next = 0;
+  cv::Mat before;
+  for (auto _ : state) {
+    const RoomPicture& one = pictures[next % pictures.size()];
+    const auto begin = std::chrono::steady_clock::now();
+    const cv::Mat now = loc::view_of(one.image);
+    if (!points.empty()) {
+      std::vector<cv::Point2f> there;
+      std::vector<cv::Point2f> back;
+      std::vector<std::uint8_t> found;
+      std::vector<std::uint8_t> found_back;
+      std::vector<float> error;
+      cv::calcOpticalFlowPyrLK(before, now, points, there, found, error, window, 3, until);
+      cv::calcOpticalFlowPyrLK(now, before, there, back, found_back, error, window, 3, until);
+      std::size_t kept = 0;
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        if (found[i] == 0 || found_back[i] == 0 || cv::norm(back[i] - points[i]) > 0.5) continue;
+        points[kept] = there[i];
+        ids[kept++] = ids[i];
+      }
+      points.resize(kept);
+      ids.resize(kept);
+    }
+    if (points.size() < kTracks) {
+      cv::Mat free(now.size(), CV_8U, cv::Scalar(255));
+      for (const cv::Point2f& p : points) cv::circle(free, p, 14, cv::Scalar(0), cv::FILLED);
+      std::vector<cv::Point2f> fresh;
+      cv::goodFeaturesToTrack(now, fresh, kTracks - static_cast<int>(points.size()), 0.01, 14, free);
+      for (const cv::Point2f& p : fresh) {
+        points.push_back(p);
+        ids.push_back(next_id++);
+      }
+    }
+    before = now;
+    if (next >= kWarmUp) seconds.push_back(seconds_since(begin));
+    state.PauseTiming();
+    if (next < pictures.size()) {
+      for (std::size_t i = 0; i < points.size(); ++i) errors.add(ids[i], {points[i].x, points[i].y}, one.pose);
+    }
+    tracks += static_cast<double>(points.size());
+    if (++next % pictures.size() == 0) {
+      points.clear();
+      ids.clear();
+    }
+    state.ResumeTiming();
+  }
+  put_quantiles(state, "front", seconds);
+  state.counters["tracks"] = tracks / static_cast<double>(next);
+  state.counters["error_px"] = errors.rms();
+}
+
+BENCHMARK(track_features)->Iterations(kRide)->Unit(benchmark::kMillisecond);
+BENCHMARK(opencv_track_features)->Iterations(kRide)->Unit(benchmark::kMillisecond);
+BENCHMARK(slam_from_pictures<loc::MonoSlam>)->Iterations(kRide)->Unit(benchmark::kMillisecond);
+BENCHMARK(slam_from_pictures<loc::InertialSlam>)->Iterations(kRide)->Unit(benchmark::kMillisecond);
 BENCHMARK(find_checkerboard)->Unit(benchmark::kMillisecond);
 BENCHMARK(find_far_checkerboard)->Unit(benchmark::kMillisecond);
 BENCHMARK(opencv_checkerboard)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);

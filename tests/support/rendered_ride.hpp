@@ -43,6 +43,21 @@ inline Pose3 swaying(double t) {
   return {so3::exp(r) * along_x(), p};
 }
 
+/// What a perfect IMU in the axes of the camera reads, by central differences of a path (z up). Its time is time_s.
+template <class Path>
+ImuMeasurement imu_of(Path&& pose, double time_s) {
+  constexpr double kH = 1e-3;
+  const Pose3 now = pose(time_s);
+  const Pose3 before = pose(time_s - kH);
+  const Pose3 after = pose(time_s + kH);
+  const Eigen::Vector3d a = (after.translation - 2 * now.translation + before.translation) / (kH * kH);
+  ImuMeasurement out;
+  out.time_ns = from_seconds(time_s);
+  out.angular_velocity = so3::boxminus(after.rotation, before.rotation) / (2 * kH);
+  out.specific_force = now.rotation.conjugate() * (a + Eigen::Vector3d(0, 0, 9.80665));
+  return out;
+}
+
 /// Where a ray from inside meets the walls, floor or ceiling of box_room().
 inline Eigen::Vector3d on_wall(const Pose3& T_world_camera, const Eigen::Vector3d& ray, const RoomModel& room = {}) {
   const Eigen::Vector3d direction = T_world_camera.rotation * ray;
