@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -117,19 +118,19 @@ void bind_images(py::module_& m) {
   m.def(
       "open_image_folder",
       [](const fs::path& folder, double rate_hz, loc::TimeNs first_time_ns, const std::string& name_unit,
-         const fs::path& times_file, const std::string& time_unit, std::int32_t camera, bool colour) {
+         const std::optional<fs::path>& times_file, const std::string& time_unit, std::int32_t camera, bool colour) {
         loc::ImageFolderOptions options;
         options.read.format = format_of(colour);
         options.camera = camera;
         options.rate_hz = rate_hz;
         options.first_time_ns = first_time_ns;
         options.name_unit = name_unit;
-        options.times_file = times_file;
+        options.times_file = times_file.value_or(fs::path());
         options.time_unit = time_unit;
         return loc::open_image_folder(folder, options);
       },
       py::arg("folder"), py::kw_only(), py::arg("rate_hz") = 0.0, py::arg("first_time_ns") = 0,
-      py::arg("name_unit") = "", py::arg("times_file") = fs::path(), py::arg("time_unit") = "", py::arg("camera") = 0,
+      py::arg("name_unit") = "", py::arg("times_file") = py::none(), py::arg("time_unit") = "", py::arg("camera") = 0,
       py::arg("colour") = false,
       "A folder of pictures. One of these tells their times: rate_hz (the names are numbers), name_unit (the names are "
       "times in ns, us, ms, s), times_file; without any: rgb.txt or times.txt in the folder.");

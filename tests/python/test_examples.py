@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 from support import CHECKOUT, data_folder, turning_body, write_csv, write_log
 
 import libloc
@@ -87,3 +88,13 @@ def test_visual_inertial(tmp_path):
     assert "is longer than the motion" in run("04_visual_inertial.py", "--duration", 91, code=1)
     source = (EXAMPLES / "04_visual_inertial.py").read_text()
     assert source.count("\n") < 60
+
+
+@pytest.mark.skipif(not libloc.HAS_VISION, reason="libloc was built without OpenCV")
+def test_slam_from_images(tmp_path):
+    text = run("04_slam_from_images.py", "--output", tmp_path / "slam.png")
+    assert text.startswith("80 pictures, ")
+    assert int(text.split(", ")[1].split()[0]) > 30
+    assert (tmp_path / "slam.png").stat().st_size > 50_000
+    source = (EXAMPLES / "04_slam_from_images.py").read_text()
+    assert source.count("\n") <= 40

@@ -58,6 +58,10 @@ def find_pictures(path: Path, options: argparse.Namespace) -> PictureInput | Non
         how["rate_hz"] = options.rate_hz
     if options.start_time is not None:
         how["start_time_ns"] = options.start_time
+    if form == "lcm":
+        # Whoever reads a recording looks at these two.
+        for name in ("rate_hz", "start_time_ns"):
+            how.pop(name, None)
     if form in ("euroc", "lcm"):
         if how:
             raise DataError(f"{path}: has times of its own, {_option(next(iter(how)))} is for other inputs")

@@ -239,11 +239,10 @@ _TROUBLE = (
 
 def _troubles(out: dict[str, Any]) -> list[str]:
     counts = out["input"]["counts"] | out["estimator"]
-    # What becomes of a track is no trouble, and has a line of its own.
     return [
         f"{name} {n}"
         for name, n in counts.items()
-        if n and not name.startswith("tracks.") and any(word in name for word in _TROUBLE)
+        if n and name != "tracks.cut_anew" and any(word in name for word in _TROUBLE)
     ]
 
 
