@@ -198,7 +198,7 @@ bool SlamFilter::approach(const FeaturesMeasurement& frame, SlamState& near) {
   const auto found = absolute_pose(sighted_, state_.T_world_camera(), narrowing);
   if (!found) return false;
   const Pose3 body = *found * state_.T_body_camera.inverse();
-  dx_.setZero();
+  dx_.setZero(covariance_.dim());  // features may have come and gone since it was last used
   dx_.segment<3>(kTheta) = so3::boxminus(body.rotation, state_.q_world_body);
   dx_.segment<3>(kPosition) = body.translation - state_.position;
   // What the prior excludes, it is not.
