@@ -118,6 +118,17 @@ def _require_vision() -> None:
         raise DataError("pictures: this libloc was built without OpenCV")
 
 
+def _check_overlap(first_ns: int, last_ns: int, imu_times_ns: NDArray[np.int64]) -> None:
+    if len(imu_times_ns) == 0:
+        raise DataError("there are no IMU samples")
+    begin_ns, end_ns = int(imu_times_ns[0]), int(imu_times_ns[-1])
+    if last_ns < begin_ns or first_ns > end_ns:
+        first, last, begin, end = map(_core.format_seconds, (first_ns, last_ns, begin_ns, end_ns))
+        raise DataError(
+            f"the pictures ({first} to {last} s) and the IMU ({begin} to {end} s) have no time in common"
+        )
+
+
 def run_image_slam(
     source: Iterable[Any] | str | PathLike[str],
     options: SlamOptions,
@@ -136,8 +147,8 @@ def run_image_slam(
     FeatureTrackerOptions. imu: in place of the source's own. rig: its calibration is applied to the IMU.
     watch(slam, picture) is called after each measurement that was used, with None unless it was a picture.
     progress(pictures done) is called after each; when it returns False the run ends, with what there is.
-    Raises DataError when the source cannot be read, ValueError for pictures of another size than the
-    camera's.
+    Raises DataError when the source cannot be read or pictures and IMU have no time in common, ValueError
+    for pictures of another size than the camera's.
     """
     _require_vision()
     if isinstance(source, (str, PathLike)):
@@ -150,7 +161,8 @@ def run_image_slam(
     counts: dict[str, int] = {}
     own = 0  # samples of imu that were used
     done = 0
-    last_ns = None
+    first_ns: int | None = None
+    last_ns: int | None = None
     stopped = False
 
     def feed(time_ns: int, gyro: NDArray[np.float64], force: NDArray[np.float64]) -> None:
@@ -186,13 +198,16 @@ def run_image_slam(
         feed_until(picture.time_ns + offset_ns)
         slam.process(picture)
         last_ns = picture.time_ns
+        first_ns = last_ns if first_ns is None else first_ns
         if watch is not None:
             watch(slam, picture)
         if progress is not None and progress(done) is False:
             stopped = True
             break
     if not stopped:
-        if last_ns is not None:
+        if first_ns is not None and last_ns is not None:
+            if inertial and imu is not None:
+                _check_overlap(first_ns + offset_ns, last_ns + offset_ns, imu.times_ns)
             feed_until(last_ns + offset_ns + _AFTER_LAST_NS)
         slam.finish()
         if watch is not None:

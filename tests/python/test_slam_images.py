@@ -256,6 +256,32 @@ def test_the_program_on_a_log(ride, folder, tmp_path, capsys):
     assert summary["truth"]["rmse_m"] < 0.02
 
 
+def test_the_program_on_numbered_pictures_with_an_imu(ride, folder, tmp_path, capsys):
+    (tmp_path / "pictures").mkdir()
+    for i, picture in enumerate(ride.pictures):
+        Image.fromarray(picture).save(tmp_path / f"pictures/{i}.png")
+    lines = ["time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"]
+    for time_ns, gyro, force in zip(
+        ride.imu.times_ns, ride.imu.angular_velocity, ride.imu.specific_force, strict=True
+    ):
+        lines.append(f"{time_ns}," + ",".join(repr(float(x)) for x in (*gyro, *force)))
+    (tmp_path / "imu.csv").write_text("\n".join(lines) + "\n")
+    start_s = int(ride.times_ns[0]) // 10**9
+    arguments = [tmp_path / "pictures", "--rate-hz", RATE_HZ, "--start-time", start_s]
+    arguments += ["--config", folder / "rig.yaml", "--imu", tmp_path / "imu.csv", "--method", "inertial-slam"]
+    out = tmp_path / "out"
+    assert call(*arguments, "--reference", folder / "truth.tum", "--output", out) == 0
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["frames"]["used"] == len(ride.pictures)
+    assert summary["truth"]["rmse_m"] < 0.01
+    assert {"summary.png", "inertial.png", "features.mp4"} <= {p.name for p in out.iterdir()}
+    # Another clock: no picture has IMU samples around it.
+    for other_s in (start_s + 1000, start_s - 1000):
+        arguments[4] = other_s
+        assert call(*arguments) == 1
+        assert "no time in common" in capsys.readouterr().err
+
+
 def test_what_is_wrong_is_named(folder, tmp_path, capsys):
     rig = ["--config", folder / "rig.yaml"]
     pictures = [folder / "pictures", "--name-unit", "ns"]
