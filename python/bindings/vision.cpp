@@ -71,7 +71,6 @@ namespace {
 namespace fs = std::filesystem;
 using loc::FeatureVideo;
 using loc::ImageMeasurement;
-using loc::MeasurementSource;
 using loc::TargetDetection;
 using loc::TargetDetector;
 
