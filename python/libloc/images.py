@@ -26,7 +26,7 @@ def picture_format(path: str | PathLike[str]) -> str | None:
     """
     path = Path(path)
     if path.is_dir():
-        if (path / "mav0").is_dir() or any(path.glob("cam[0-9]*/data.csv")):
+        if (path / "mav0").is_dir() or any(path.glob("cam[0-9]*/data.csv")) or (path / "imu0").is_dir():
             return "euroc"
         return "folder"
     if not path.is_file():
