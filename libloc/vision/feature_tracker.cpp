@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "libloc/core/check.hpp"
+#include "libloc/estimators/picture_rest.hpp"
 #include "libloc/geometry/camera.hpp"
 #include "libloc/vision/corner_detector.hpp"
 #include "libloc/vision/image_view.hpp"
@@ -29,9 +30,12 @@ constexpr double kKltDisagrees = 1.5;  // two ways from the last picture to this
 constexpr int kMostKltSteps = 20;
 constexpr double kKltConverged = 0.03;  // [px]
 constexpr double kKltEigenvalue = 1e-3;
-constexpr double kVagueGuess = 60;  // deviation of a place that is no guess any more [px]
-constexpr double kTwins = 5;        // two tracks nearer than this are one feature [px]
-constexpr int kBrightnessStep = 4;  // every so many pixels count for the mean brightness
+constexpr double kVagueGuess = 60;   // deviation of a place that is no guess any more [px]
+constexpr double kTwins = 5;         // two tracks nearer than this are one feature [px]
+constexpr int kBrightnessStep = 4;   // every so many pixels count for the mean brightness
+constexpr double kStillPx = 1;       // a picture that is nearer to where it was stands still …
+constexpr double kStillTime = 1;     // … when it has been for so long [s]
+constexpr double kMostSigmaPx = 30;  // of a standing picture; more says nothing either
 constexpr double kBorder = kPatchHalf + 2;
 
 double seconds_since(Clock::time_point begin) {
@@ -117,7 +121,9 @@ void FeatureTrackerOptions::check() const {
 
 struct FeatureTracker::Work {
   Work(const CameraCalibration& calibration, const FeatureTrackerOptions& given)
-      : camera(calibration), options((given.check(), given)) {
+      : camera(calibration),
+        options((given.check(), given)),
+        rest(calibration.intrinsics_px.tail<2>(), kStillPx, kStillTime) {
     require(calibration.width_px >= 64 && calibration.height_px >= 64,
             "camera: the picture is less than 64 pixels wide or high");
     // Half as many cells again as there are tracks: some have no corner.
@@ -145,6 +151,8 @@ struct FeatureTracker::Work {
   Pose3 T_world_before;  // camera, of the picture before
   bool has_before_pose = false;
   FeaturesMeasurement out;
+  PictureRest rest;
+  int still_pictures = 0;  // in a row
   std::vector<TrackedFeature> tracked;
   FeatureTrackerTimes times;
   std::vector<Avoided> avoided;
@@ -422,7 +430,6 @@ void FeatureTracker::Work::forget_picture() {
 void FeatureTracker::Work::out_without(const ImageMeasurement& image) {
   static_cast<Stamp&>(out) = image;
   out.camera = image.camera;
-  out.sigma_px = options.sigma_px;
   out.features.clear();
   tracked.clear();
 }
@@ -442,6 +449,10 @@ void FeatureTracker::Work::give_out(const ImageMeasurement& image) {
     cut_anew += track.origin == TrackOrigin::kCutAnew ? 1 : 0;
     refound += track.origin == TrackOrigin::kRefound ? 1 : 0;
   }
+  rest.see(out, out.time_ns);
+  still_pictures = rest.stands_still(out.time_ns) ? still_pictures + 1 : 0;
+  out.sigma_px = options.sigma_px * std::sqrt(1.0 + still_pictures);
+  if (out.sigma_px > kMostSigmaPx) out.sigma_px = std::max(kMostSigmaPx, options.sigma_px);
 }
 
 FeatureTracker::FeatureTracker(const CameraCalibration& camera, const FeatureTrackerOptions& options)
@@ -513,6 +524,8 @@ void FeatureTracker::reset() {
   w.avoided.clear();
   w.picture = 0;
   w.has_before_pose = false;
+  w.rest.reset();
+  w.still_pictures = 0;
 }
 
 const std::vector<TrackedFeature>& FeatureTracker::last() const {

@@ -10,14 +10,13 @@
 //      looks like the feature is cut anew where the feature is now.
 //   3. features of the map that were lost or come back into view: as 1, with a stricter correlation
 //   4. corners in cells of the picture that have none (FAST, then the smaller eigenvalue of Shi and Tomasi)
-// A picture in which nothing is found, neither tracks nor corners, counts as one that did not come: the next one goes on
-// from the picture before it.
-// What the filter rejects several times in a row is taken for something that moves by itself: its track ends, and for a
-// while no new one begins there. A change of exposure is taken out before 2; 1 and 3 do not feel it.
-// Frames: pixels as in patch.hpp, distorted, as the camera sees them. Identities are never used twice. Not thread safe.
-// Source: J. Shi, C. Tomasi, "Good features to track", CVPR 1994; E. Rosten, T. Drummond, "Machine learning for
-// high-speed corner detection", ECCV 2006; J.-Y. Bouguet, "Pyramidal implementation of the Lucas Kanade feature
-// tracker", 2000; A. Davison et al., "MonoSLAM", PAMI 29, 2007 (active search). Uses OpenCV for 2 and FAST.
+// A picture in which nothing is found, neither tracks nor corners, counts as one that did not come: the next one goes
+// on from the picture before it. What the filter rejects several times in a row is taken for something that moves by
+// itself: its track ends, and for a while no new one begins there. A change of exposure is taken out before 2; 1 and 3
+// do not feel it. Frames: pixels as in patch.hpp, distorted, as the camera sees them. Identities are never used twice.
+// Not thread safe. Source: J. Shi, C. Tomasi, "Good features to track", CVPR 1994; E. Rosten, T. Drummond, "Machine
+// learning for high-speed corner detection", ECCV 2006; J.-Y. Bouguet, "Pyramidal implementation of the Lucas Kanade
+// feature tracker", 2000; A. Davison et al., "MonoSLAM", PAMI 29, 2007 (active search). Uses OpenCV for 2 and FAST.
 #pragma once
 
 #include <cstdint>
@@ -48,7 +47,9 @@ struct FeatureTrackerOptions {
   int avoid_frames = 20;                 ///< for so long no new track begins where something moved
   double avoid_radius_px = 25;           ///< and so far around
   double exposure_step = 0.04;           ///< relative change of the mean brightness that is taken out
-  double sigma_px = kUnknown;            ///< what the tracks say of themselves; NaN: nothing, the filter knows
+  /// Deviation of a coordinate, errors that last included, which tracks say of themselves. While the picture stands
+  /// still the same errors come again and again: the n-th picture says sqrt(n) times as much. NaN: nothing is said.
+  double sigma_px = 1;
 
   /// @throws std::invalid_argument naming the field and its value.
   void check() const;

@@ -11,8 +11,8 @@
 
 namespace loc {
 
-/// Settings of the filter for tracks of FeatureTracker, where they differ from the general ones: pixels good to one
-/// (errors that last included), features that stay inverse depth for longer, and for a camera alone the noise of second
+/// Settings of the filter for tracks of FeatureTracker, where they differ from the general ones: features that stay
+/// inverse depth for longer, and for a camera alone the noise of second
 /// order, since pictures may begin in a turn.
 inline SlamOptions slam_options_for_images(SlamOptions options) {
   options.sigma_px = 1;

@@ -464,6 +464,26 @@ TEST(FeatureTracker, IdentitiesAreNeverUsedTwiceAlsoAfterReset) {
   EXPECT_GT(ids.size(), 60U);
 }
 
+// The same errors come again and again: n pictures of a camera that stands still are not n measurements.
+TEST(FeatureTracker, StandingPicturesSayLessAndLess) {
+  RoomCamera room(test::small_camera());
+  FeatureTracker tracker(room.calibration(), {.sigma_px = 0.5});
+  ImageMeasurement image = room.at(test::swaying(0), 0);
+  const auto sigma_after = [&](int pictures) {
+    double sigma = 0;
+    for (int i = 0; i < pictures; ++i) {
+      image.time_ns += kFrameNs;
+      sigma = tracker.track(image).sigma_px;
+    }
+    return sigma;
+  };
+  const auto a_second = static_cast<int>(from_seconds(1) / kFrameNs);
+  EXPECT_EQ(sigma_after(a_second - 2), 0.5) << "not yet a second";
+  EXPECT_NEAR(sigma_after(2 + 99), 0.5 * std::sqrt(100.0), 0.06);
+  image.data = room.at(test::swaying(0.2), 0).data;
+  EXPECT_EQ(sigma_after(1), 0.5) << "it moves";
+}
+
 TEST(FeatureTracker, PicturesThatAreNotTheCamerasAreRefusedAndChangeNothing) {
   RoomCamera room(test::small_camera());
   FeatureTracker tracker(room.calibration());
