@@ -247,7 +247,7 @@ void FeatureTracker::Work::take_prediction(const SlamPrediction* expected) {
 // How offsets around the feature where its patch was cut come to offsets around it now: the surface is taken to face
 // the camera that saw it first. Without poses: as it was.
 Eigen::Matrix2d FeatureTracker::Work::warp_of(const Track& track, const SlamPrediction* expected) const {
-  const Eigen::Matrix2d same = Eigen::Matrix2d::Identity();
+  Eigen::Matrix2d same = Eigen::Matrix2d::Identity();
   if (expected == nullptr || !expected->valid || track.expected == nullptr || !track.anchor.has_pose) return same;
   const Pose3& then = track.anchor.T_world_camera;
   const Eigen::Vector3d way = track.expected->point - track.expected->weight * then.translation;
