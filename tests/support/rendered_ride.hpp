@@ -77,7 +77,8 @@ ImageMeasurement changed(const ImageMeasurement& image, Function&& value) {
   auto bytes = std::make_shared<std::vector<std::uint8_t>>(*image.data);
   for (int y = 0; y < image.height_px; ++y) {
     for (int x = 0; x < image.width_px; ++x) {
-      std::uint8_t& v = (*bytes)[static_cast<std::size_t>(y * image.row_stride_bytes + x)];
+      std::uint8_t& v = (*bytes)[static_cast<std::size_t>(y) * static_cast<std::size_t>(image.row_stride_bytes) +
+                                 static_cast<std::size_t>(x)];
       v = static_cast<std::uint8_t>(std::clamp(std::lround(value(static_cast<double>(v), x, y)), 0L, 255L));
     }
   }
@@ -101,13 +102,14 @@ inline ImageMeasurement covered(const ImageMeasurement& image, const Cover& cove
   constexpr int kSquare = 8;
   const int columns = cover.width / kSquare + 1;
   Random random(cover.pattern);
-  std::vector<double> squares(static_cast<std::size_t>(columns * (cover.height / kSquare + 1)));
+  std::vector<double> squares(static_cast<std::size_t>(columns) * static_cast<std::size_t>(cover.height / kSquare + 1));
   for (double& square : squares) square = random.uniform(30, 220);
   return changed(image, [&](double v, int x, int y) {
     const int u = x - static_cast<int>(std::lround(cover.left));
     const int w = y - static_cast<int>(std::lround(cover.top));
     if (u < 0 || w < 0 || u >= cover.width || w >= cover.height) return v;
-    return squares[static_cast<std::size_t>(w / kSquare * columns + u / kSquare)];
+    return squares[static_cast<std::size_t>(w / kSquare) * static_cast<std::size_t>(columns) +
+                   static_cast<std::size_t>(u / kSquare)];
   });
 }
 

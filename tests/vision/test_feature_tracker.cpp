@@ -36,7 +36,8 @@ constexpr TimeNs kFrameNs = 50'000'000;
 struct Gray {
   int width = 160;
   int height = 120;
-  std::vector<std::uint8_t> bytes = std::vector<std::uint8_t>(static_cast<std::size_t>(width * height), 0);
+  std::vector<std::uint8_t> bytes =
+      std::vector<std::uint8_t>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 0);
 
   GrayView view() const { return {bytes.data(), width, height, width}; }
   template <class Function>
@@ -251,7 +252,8 @@ TEST(Corners, AreSpreadStrongestFirstAndKeepTheirDistance) {
   const double strongest = corners[0].strength;
   // Places beside the corners, in other cells where a border runs between.
   std::vector<Vector2d> beside;
-  for (const Corner& c : corners) beside.push_back(c.pixel_px + Vector2d(11, 0));
+  beside.reserve(corners.size());
+  for (const Corner& c : corners) beside.emplace_back(c.pixel_px + Vector2d(11, 0));
   std::vector<Corner> others;
   find_corners(view, beside, options, others);
   for (const Corner& c : others) {
