@@ -300,7 +300,8 @@ void bind_front_end(py::module_& m) {
                              "From pictures to tracks: which feature is where in which picture. Alone, without a "
                              "filter that tells where to look; ImageSlam has one.")
       .def(py::init<const CameraCalibration&, const FeatureTrackerOptions&>(), py::arg("camera"),
-           py::arg("options") = FeatureTrackerOptions{}, "ValueError names a field that is out of range.")
+           py::arg_v("options", FeatureTrackerOptions{}, "FeatureTrackerOptions()"),
+           "ValueError names a field that is out of range.")
       .def(
           "track",
           [](FeatureTracker& self, const py::array& image, loc::TimeNs time_ns) {
@@ -344,7 +345,8 @@ void bind_slam_of_images(py::module_& m) {
                 "SLAM from pictures: a front end (FeatureTracker) and the estimator that options.motion names "
                 "(MonoSlam, InertialSlam), which tells it where to look. Start with slam_options_for_images().")
       .def(py::init<const SlamOptions&, const FeatureTrackerOptions&>(), py::arg("options"),
-           py::arg("front_end") = FeatureTrackerOptions{}, "ValueError names a field that is out of range.")
+           py::arg_v("front_end", FeatureTrackerOptions{}, "FeatureTrackerOptions()"),
+           "ValueError names a field that is out of range.")
       .def("process", &S::process, py::arg("measurement"),
            "The next measurement in time order: a picture that is decoded, or an IMU sample. Says whether estimate() "
            "is new.")

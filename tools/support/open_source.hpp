@@ -35,8 +35,9 @@ bool is_receiver(const std::string& source_kind);
 /// A source that only open_source_with_images() opens (open_image_source.hpp).
 bool needs_vision(const SourceSpec& spec);
 
-/// Kind of a recording by its looks: a folder is images when it holds pictures or a list of them and no EuRoC recording,
-/// otherwise euroc; *.csv eqvio by its heading, otherwise csv; *.mat broad, *.rawlog rawlog, *.mp4 and the like video,
+/// Kind of a recording by its looks: a folder is images when it holds pictures or a list of them and no EuRoC
+/// recording, otherwise euroc; *.csv eqvio by its heading, otherwise csv; *.mat broad, *.rawlog rawlog, *.mp4 and the
+/// like video,
 /// *.nmea nmea, another file that has NMEA sentences within its first 4 kB nmea, all else lcm-log.
 std::string guess_source_kind(const std::string& path);
 

@@ -9,7 +9,7 @@ import numpy.typing
 import os
 import typing
 from . import so3
-__all__: list[str] = ['AbsoluteError', 'AccelerometerFit', 'AccelerometerOptions', 'Alignment', 'AllanFit', 'AllanOptions', 'AllanTerm', 'Association', 'Camera', 'CameraCalibration', 'CameraModel', 'CameraRun', 'CarMotion', 'CircleMotion', 'ClockCalibration', 'ClockCalibrationResult', 'ClockChain', 'ClockLine', 'ClockModel', 'Consistency', 'CounterUnwrapper', 'DataError', 'DiscreteImuNoise', 'DistortionModel', 'ESTIMATE_CHANNEL', 'EllipsoidAdvice', 'EllipsoidCollector', 'EllipsoidFit', 'EllipsoidOptions', 'EqvioSource', 'ErrorStateFilter', 'ErrorStateOptions', 'ErrorStateRun', 'ErrorStatistics', 'Estimate', 'EstimateStatus', 'EstimateValid', 'FUSION_CHANNEL', 'FeaturesArrays', 'FeaturesMeasurement', 'FigureEightMotion', 'FusionOutcome', 'FusionPreset', 'FusionPresetSensors', 'FusionResult', 'FusionStartOptions', 'GPS_CHANNEL', 'GpsArrays', 'GpsCalibration', 'GpsClock', 'GpsFixType', 'GpsMeasurement', 'GpsModel', 'GyroscopeFit', 'GyroscopeOptions', 'HandHeldMotion', 'IMAGE_CHANNEL', 'IMU_CHANNEL', 'ImageMeasurement', 'ImuAllan', 'ImuArrays', 'ImuCalibration', 'ImuIntegration', 'ImuMeasurement', 'ImuModel', 'ImuNoise', 'ImuNoiseFit', 'ImuSampleModel', 'ImuSampling', 'InertialSlam', 'InertialTriadModel', 'InverseDepthPoint', 'KnownLandmark', 'LcmLogReader', 'LocalFrame', 'LookAtMotion', 'MAGNETOMETER_CHANNEL', 'MadgwickFilter', 'MadgwickOptions', 'MadgwickResult', 'MagnetometerAlignment', 'MagnetometerAlignmentOptions', 'MagnetometerArrays', 'MagnetometerCalibration', 'MagnetometerMeasurement', 'MagnetometerModel', 'MeasurementSource', 'MonoSlam', 'Motion', 'MotionArrays', 'MountedMotion', 'NO_TIME', 'NmeaFixes', 'ODOMETRY_CHANNEL', 'OdometryArrays', 'OdometryMeasurement', 'OrientationError', 'PedestrianMotion', 'Pose3', 'PredictOutcome', 'Quality', 'REFERENCE_CHANNEL', 'Random', 'Recording', 'ReferenceArrays', 'ReferenceMeasurement', 'RelativeError', 'RestFirstMotion', 'RestMotion', 'RestNoise', 'Rig', 'SOURCE_STATUS_CHANNEL', 'STATISTICS_CHANNEL', 'Scenario', 'ScenarioStreams', 'Scene', 'SceneRenderer', 'SimulatedRun', 'Simulation', 'SlamAssociationOptions', 'SlamConsistency', 'SlamCounts', 'SlamFeatureArrays', 'SlamFeatureState', 'SlamFile', 'SlamFrame', 'SlamLandmarkArrays', 'SlamMapArrays', 'SlamMapOptions', 'SlamMotion', 'SlamOptions', 'SlamPrecision', 'SlamRun', 'SlamSnapshot', 'SlamStartOptions', 'StandStillOptions', 'StillSegment', 'Stillness', 'StillnessDetector', 'StillnessOptions', 'StreamClockModel', 'StreetModel', 'TRACKS_CHANNEL', 'TimeOffsetResult', 'Trajectory', 'TriadCalibration', 'TriadQuality', 'TruthArrays', 'Verdict', 'VisualOdometryModel', 'WaypointMotion', 'absolute_error', 'align_magnetometer', 'align_points', 'aligned', 'allan_fit', 'analyse_imu_noise', 'april_grid', 'associate', 'average_consistency', 'beta_from_gyro', 'box_room', 'calibrate_clock', 'checkerboard', 'chi_square_cdf', 'chi_square_quantile', 'discretise', 'error_statistics', 'estimate_time_offset', 'example_drive', 'find_stillness', 'fit_accelerometer', 'fit_accelerometer_poses', 'fit_ellipsoid', 'fit_gyroscope', 'fit_gyroscope_bias', 'format_seconds', 'gps_from_unix', 'imu_noise_from', 'is_eqvio', 'leap_seconds_known_until', 'load_slam', 'local_positions', 'message_fingerprints', 'message_type', 'normalised_error_squared', 'open_broad', 'open_csv', 'open_eqvio', 'open_euroc', 'open_lcm_log', 'open_nmea', 'orientation_error', 'parse_nmea', 'parse_seconds', 'quantile', 'read_any_rig', 'read_points', 'read_rig', 'read_slam_options', 'read_tracks', 'read_tum', 'relative_error', 'root_mean_square', 'sampled_path', 'save_slam', 'scenario_names', 'simulate', 'simulate_camera', 'simulate_clock', 'simulate_gps_time', 'slam_options_text', 'so3', 'street', 'unix_from_gps', 'update_rig', 'write_ply', 'write_points', 'write_rig', 'write_slam_options', 'write_tracks', 'write_tum']
+__all__: list[str] = ['AbsoluteError', 'AccelerometerFit', 'AccelerometerOptions', 'Alignment', 'AllanFit', 'AllanOptions', 'AllanTerm', 'Association', 'CalibrationTarget', 'Camera', 'CameraCalibration', 'CameraFit', 'CameraFitOptions', 'CameraFitView', 'CameraModel', 'CameraRun', 'CarMotion', 'CircleMotion', 'ClockCalibration', 'ClockCalibrationResult', 'ClockChain', 'ClockLine', 'ClockModel', 'Consistency', 'CounterUnwrapper', 'DataError', 'DiscreteImuNoise', 'DistortionModel', 'ESTIMATE_CHANNEL', 'EllipsoidAdvice', 'EllipsoidCollector', 'EllipsoidFit', 'EllipsoidOptions', 'EqvioSource', 'ErrorStateFilter', 'ErrorStateOptions', 'ErrorStateRun', 'ErrorStatistics', 'Estimate', 'EstimateStatus', 'EstimateValid', 'FUSION_CHANNEL', 'FeatureTracker', 'FeatureTrackerOptions', 'FeatureTrackerTimes', 'FeatureVideo', 'FeaturesArrays', 'FeaturesMeasurement', 'FigureEightMotion', 'FusionOutcome', 'FusionPreset', 'FusionPresetSensors', 'FusionResult', 'FusionStartOptions', 'GPS_CHANNEL', 'GpsArrays', 'GpsCalibration', 'GpsClock', 'GpsFixType', 'GpsMeasurement', 'GpsModel', 'GyroscopeFit', 'GyroscopeOptions', 'HAS_VISION', 'HandHeldMotion', 'IMAGE_CHANNEL', 'IMU_CHANNEL', 'ImageMeasurement', 'ImageSlam', 'ImuAllan', 'ImuArrays', 'ImuCalibration', 'ImuIntegration', 'ImuMeasurement', 'ImuModel', 'ImuNoise', 'ImuNoiseFit', 'ImuSampleModel', 'ImuSampling', 'InertialSlam', 'InertialTriadModel', 'InverseDepthPoint', 'KnownLandmark', 'LcmLogReader', 'LocalFrame', 'LookAtMotion', 'MAGNETOMETER_CHANNEL', 'MadgwickFilter', 'MadgwickOptions', 'MadgwickResult', 'MagnetometerAlignment', 'MagnetometerAlignmentOptions', 'MagnetometerArrays', 'MagnetometerCalibration', 'MagnetometerMeasurement', 'MagnetometerModel', 'MeasurementSource', 'MonoSlam', 'Motion', 'MotionArrays', 'MountedMotion', 'NO_TIME', 'NmeaFixes', 'ODOMETRY_CHANNEL', 'OdometryArrays', 'OdometryMeasurement', 'OrientationError', 'PedestrianMotion', 'Pose3', 'PredictOutcome', 'Quality', 'REFERENCE_CHANNEL', 'Random', 'Recording', 'ReferenceArrays', 'ReferenceMeasurement', 'RelativeError', 'RestFirstMotion', 'RestMotion', 'RestNoise', 'Rig', 'SOURCE_STATUS_CHANNEL', 'STATISTICS_CHANNEL', 'Scenario', 'ScenarioStreams', 'Scene', 'SceneRenderer', 'SimulatedRun', 'Simulation', 'SlamAssociationOptions', 'SlamConsistency', 'SlamCounts', 'SlamFeatureArrays', 'SlamFeatureState', 'SlamFile', 'SlamFrame', 'SlamLandmarkArrays', 'SlamMapArrays', 'SlamMapOptions', 'SlamMotion', 'SlamOptions', 'SlamPrecision', 'SlamPredictionArrays', 'SlamRun', 'SlamSnapshot', 'SlamStartOptions', 'StandStillOptions', 'StillSegment', 'Stillness', 'StillnessDetector', 'StillnessOptions', 'StreamClockModel', 'StreetModel', 'TRACKS_CHANNEL', 'TargetDetection', 'TargetDetector', 'TargetView', 'TimeOffsetResult', 'TrackArrays', 'TrackOrigin', 'Trajectory', 'TriadCalibration', 'TriadQuality', 'TruthArrays', 'Verdict', 'VisualOdometryModel', 'WaypointMotion', 'absolute_error', 'align_magnetometer', 'align_points', 'aligned', 'allan_fit', 'analyse_imu_noise', 'april_grid', 'associate', 'average_consistency', 'beta_from_gyro', 'box_room', 'calibrate_camera', 'calibrate_clock', 'checkerboard', 'chi_square_cdf', 'chi_square_quantile', 'choose_views', 'decode_image', 'discretise', 'error_statistics', 'estimate_time_offset', 'euroc_cameras', 'example_drive', 'find_stillness', 'finds_april_grids', 'fit_accelerometer', 'fit_accelerometer_poses', 'fit_ellipsoid', 'fit_gyroscope', 'fit_gyroscope_bias', 'format_seconds', 'gps_from_unix', 'image_array', 'image_measurement', 'imu_noise_from', 'is_eqvio', 'leap_seconds_known_until', 'load_slam', 'local_positions', 'message_fingerprints', 'message_type', 'normalised_error_squared', 'open_broad', 'open_csv', 'open_eqvio', 'open_euroc', 'open_euroc_images', 'open_image_folder', 'open_lcm_log', 'open_nmea', 'open_video', 'orientation_error', 'parse_nmea', 'parse_seconds', 'quantile', 'read_any_rig', 'read_points', 'read_rig', 'read_slam_options', 'read_tracks', 'read_tum', 'relative_error', 'root_mean_square', 'sampled_path', 'save_slam', 'scenario_names', 'simulate', 'simulate_camera', 'simulate_clock', 'simulate_gps_time', 'slam_options_for_images', 'slam_options_text', 'so3', 'street', 'unix_from_gps', 'update_rig', 'write_geojson', 'write_gpx', 'write_kml', 'write_ply', 'write_points', 'write_rig', 'write_slam_options', 'write_tracks', 'write_tum']
 class DataError(ValueError):
     """
     What is wrong in a file or message: where (file, line or byte), which field, which value.
@@ -4237,6 +4237,315 @@ class SceneRenderer:
         """
         uint8 (height, width) or (height, width, 3). Several poses: their mean, as motion blur.
         """
+class CalibrationTarget:
+    """
+    A flat target: CalibrationTarget('checkerboard 9x6 0.025') with inner corners and the side of a square [m], or CalibrationTarget('aprilgrid 6x6 0.088 0.3') as Kalibr has it, with the side of a tag [m] and the spacing as a share of it. Origin at corner 0, x right, y up, z towards who looks at it.
+    """
+    @staticmethod
+    def read_kalibr(path: os.PathLike | str | bytes) -> CalibrationTarget:
+        """
+        From Kalibr's target.yaml.
+        """
+    def __init__(self, text: str) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __str__(self) -> str:
+        ...
+    def corners(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3): places of all corners [m]; the row is the corner's id.
+        """
+    def write_kalibr(self, path: os.PathLike | str | bytes) -> None:
+        ...
+    @property
+    def columns(self) -> int:
+        """
+        inner corners or tags along x
+        """
+    @property
+    def first_tag(self) -> int:
+        ...
+    @property
+    def has_direction(self) -> bool:
+        """
+        False for a checkerboard that looks the same after half a turn.
+        """
+    @property
+    def is_april_grid(self) -> bool:
+        ...
+    @property
+    def rows(self) -> int:
+        ...
+    @property
+    def size_m(self) -> float:
+        """
+        side of a square or tag
+        """
+    @property
+    def spacing(self) -> float:
+        ...
+class TargetView:
+    """
+    The corners of the target in one picture: TargetView(ids, pixels_px).
+    """
+    def __init__(self, ids: numpy.typing.NDArray[numpy.int64], pixels_px: numpy.typing.NDArray[numpy.float64], time_ns: typing.SupportsInt | typing.SupportsIndex | None = None) -> None:
+        ...
+    def __len__(self) -> int:
+        ...
+    @property
+    def ids(self) -> numpy.typing.NDArray[numpy.int64]:
+        ...
+    @property
+    def pixels_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 2); (0, 0) is the centre of the top-left pixel
+        """
+    @property
+    def time_ns(self) -> int | None:
+        ...
+class CameraFitOptions:
+    """
+    Options of calibrate_camera; every field is a keyword.
+    """
+    model: DistortionModel
+    def __init__(self, **kwargs) -> None:
+        ...
+    def check(self) -> None:
+        ...
+    @property
+    def compare_models(self) -> bool:
+        """
+        also fits the other distortion model
+        """
+    @compare_models.setter
+    def compare_models(self, arg0: bool) -> None:
+        ...
+    @property
+    def corner_limit(self) -> float:
+        """
+        corners farther off are dropped [sigmas]
+        """
+    @corner_limit.setter
+    def corner_limit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_iterations(self) -> int:
+        ...
+    @max_iterations.setter
+    def max_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_corners(self) -> int:
+        """
+        pictures with fewer are not used
+        """
+    @min_corners.setter
+    def min_corners(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def view_limit(self) -> float:
+        """
+        pictures with a larger rms are dropped [medians]
+        """
+    @view_limit.setter
+    def view_limit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class CameraFitView:
+    """
+    One picture in the result of calibrate_camera.
+    """
+    @property
+    def T_camera_target(self) -> Pose3:
+        ...
+    @property
+    def corners(self) -> int:
+        ...
+    @property
+    def corners_dropped(self) -> int:
+        ...
+    @property
+    def reason(self) -> str:
+        """
+        why it is not used; empty when it is
+        """
+    @property
+    def rms_px(self) -> float:
+        """
+        NaN: there is no pose
+        """
+    @property
+    def tilt(self) -> float:
+        """
+        [rad] 0: seen from straight ahead
+        """
+    @property
+    def used(self) -> bool:
+        ...
+    @property
+    def worst_px(self) -> float:
+        ...
+class CameraFit:
+    """
+    Result of calibrate_camera.
+    """
+    @property
+    def camera(self) -> CameraCalibration:
+        ...
+    @property
+    def converged(self) -> bool:
+        ...
+    @property
+    def corner_id(self) -> numpy.typing.NDArray[numpy.int64]:
+        ...
+    @property
+    def corner_pixel_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def corner_residual_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, 2) found less projected
+        """
+    @property
+    def corner_used(self) -> numpy.typing.NDArray[numpy.bool]:
+        ...
+    @property
+    def corner_view(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (M,) index of the picture of each corner that has a residual
+        """
+    @property
+    def corners_dropped(self) -> int:
+        ...
+    @property
+    def corners_used(self) -> int:
+        ...
+    @property
+    def covariance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (8, 8) of fx fy cx cy and the distortion, from the size of the residuals
+        """
+    @property
+    def covered_share(self) -> float:
+        """
+        of 12 x 9 cells of the image, those with a corner
+        """
+    @property
+    def iterations(self) -> int:
+        ...
+    @property
+    def median_uncertainty_px(self) -> float:
+        ...
+    @property
+    def noise_px(self) -> float:
+        """
+        deviation of one coordinate of a corner
+        """
+    @property
+    def other_model_rms_px(self) -> float:
+        """
+        NaN: not compared
+        """
+    @property
+    def quality(self) -> Quality:
+        ...
+    @property
+    def radius_share(self) -> float:
+        """
+        farthest corner from the middle, of half the diagonal
+        """
+    @property
+    def rms_px(self) -> float:
+        """
+        of the distances of all corners that were used
+        """
+    @property
+    def sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (8,) the larger of both
+        """
+    @property
+    def sigma_by_views(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (8,) deviations from how differently the pictures pull; NaN for fewer than 16 pictures
+        """
+    @property
+    def tilt_range(self) -> float:
+        """
+        largest angle between two of the target's normals [rad]
+        """
+    @property
+    def uncertainty_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (9, 12) deviation of the pixel of a given ray across the image; NaN: no ray there
+        """
+    @property
+    def views(self) -> list[CameraFitView]:
+        """
+        one for each picture that was given
+        """
+    @property
+    def views_used(self) -> int:
+        ...
+    @property
+    def worst_uncertainty_px(self) -> float:
+        ...
+class FeatureVideo:
+    """
+    A video file of features over the camera's pictures: .mp4 or .avi.
+    """
+    def __init__(self, path: os.PathLike | str | bytes, width_px: typing.SupportsInt | typing.SupportsIndex, height_px: typing.SupportsInt | typing.SupportsIndex, rate_hz: typing.SupportsFloat | typing.SupportsIndex = 20.0, *, tail_frames: typing.SupportsInt | typing.SupportsIndex = 10, identities: bool = True, dot_radius_px: typing.SupportsInt | typing.SupportsIndex = 3) -> None:
+        """
+        DataError when it cannot be written; ValueError for sizes that are not positive and even.
+        """
+    def add(self, features: FeaturesMeasurement, picture: ImageMeasurement = None) -> None:
+        """
+        picture: ImageMeasurement; None: white.
+        """
+    def finish(self) -> None:
+        """
+        Closes the file and looks whether it holds what was added.
+        """
+    @property
+    def codec(self) -> str:
+        ...
+    @property
+    def frames(self) -> int:
+        ...
+class TargetDetection:
+    """
+    What a TargetDetector found in one picture.
+    """
+    @property
+    def corners_left_out(self) -> int:
+        """
+        not sharp enough to be placed
+        """
+    @property
+    def foreign_tags(self) -> int:
+        """
+        that are no part of the grid
+        """
+    @property
+    def reason(self) -> str:
+        """
+        why there are no corners
+        """
+    @property
+    def view(self) -> TargetView:
+        """
+        no corners: the target was not found
+        """
+class TargetDetector:
+    """
+    Finds a calibration target in pictures, its corners to a few hundredths of a pixel.
+    """
+    def __init__(self, target: CalibrationTarget, *, thorough: bool = True, min_tags: typing.SupportsInt | typing.SupportsIndex = 2, min_contrast: typing.SupportsFloat | typing.SupportsIndex = 15.0, max_disagreement_px: typing.SupportsFloat | typing.SupportsIndex = 0.35) -> None:
+        ...
+    def detect(self, image: numpy.ndarray) -> TargetDetection:
+        """
+        image: uint8, (height, width) or (height, width, 3) with blue first.
+        """
 class SlamMotion(enum.IntEnum):
     """
     What the filter knows of the motion.
@@ -5073,6 +5382,14 @@ class SlamOptions:
     def recover_after(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
+    def second_order_noise(self) -> bool:
+        """
+        A pixel's variance grows by what the product of the errors of depth and way makes.
+        """
+    @second_order_noise.setter
+    def second_order_noise(self, arg0: bool) -> None:
+        ...
+    @property
     def sigma_angular_velocity(self) -> float:
         """
         Of the start, root of P_angular [rad/s].
@@ -5799,9 +6116,13 @@ class InertialSlam:
         """
     def estimate(self) -> Estimate:
         ...
+    def finish(self) -> bool:
+        """
+        The end of a recording: samples that are held back are used, and frames that wait for a sample after them, when they are nearer to the last sample than the next one would be. Says whether estimate() is new; frames() has the frames.
+        """
     def frames(self) -> list[SlamFrame]:
         """
-        [SlamFrame]: those that the last process() has completed, usually none or one; at the start all that waited.
+        [SlamFrame]: those that the last process() or finish() has completed, usually none or one; at the start all that waited.
         """
     def map(self) -> SlamMapArrays:
         """
@@ -5825,11 +6146,11 @@ class InertialSlam:
         """
         Goes on from there: the next frame may come at any later time, or on another clock. ValueError when it does not fit the options.
         """
-    def run(self, time_ns: numpy.typing.NDArray[numpy.int64], first: numpy.typing.NDArray[numpy.int64], id: numpy.typing.NDArray[numpy.int64], pixel_px: numpy.typing.NDArray[numpy.float64], imu_time_ns: numpy.typing.NDArray[numpy.int64], gyro: numpy.typing.NDArray[numpy.float64], force: numpy.typing.NDArray[numpy.float64], *, camera: numpy.typing.ArrayLike | None = None, sigma_px: numpy.typing.ArrayLike | None = None, progress: collections.abc.Callable | None = None, with_covariance: bool = True, with_features: bool = False) -> SlamRun:
+    def run(self, time_ns: numpy.typing.NDArray[numpy.int64], first: numpy.typing.NDArray[numpy.int64], id: numpy.typing.NDArray[numpy.int64], pixel_px: numpy.typing.NDArray[numpy.float64], imu_time_ns: numpy.typing.NDArray[numpy.int64], gyro: numpy.typing.NDArray[numpy.float64], force: numpy.typing.NDArray[numpy.float64], *, camera: numpy.typing.ArrayLike | None = None, sigma_px: numpy.typing.ArrayLike | None = None, progress: collections.abc.Callable | None = None, with_covariance: bool = True, with_features: bool = False, finish: bool = False) -> SlamRun:
         """
         A whole recording in one call, without the GIL and without copies of the input; the same numbers as step by step, and the next call goes on from here.
         
-        Frame i at time_ns[i] has the features first[i]:first[i + 1] of id (M,) and pixel_px (M, 2): the fields of Recording.features. sigma_px and camera: one, or one for each frame; by default those of the options. With an IMU: imu_time_ns int64 (S,), gyro (S, 3) [rad/s], force (S, 3) [m/s^2], at rest +9.81 upwards. progress(frames done, frames in all) is called a few times in a second; when it returns False the run ends, with what there is. KeyboardInterrupt leaves the estimator where it was then.
+        Frame i at time_ns[i] has the features first[i]:first[i + 1] of id (M,) and pixel_px (M, 2): the fields of Recording.features. sigma_px and camera: one, or one for each frame; by default those of the options. With an IMU: imu_time_ns int64 (S,), gyro (S, 3) [rad/s], force (S, 3) [m/s^2], at rest +9.81 upwards. progress(frames done, frames in all) is called a few times in a second; when it returns False the run ends, with what there is. KeyboardInterrupt leaves the estimator where it was then. finish: it is the end of the recording, see finish().
         """
     def snapshot(self) -> SlamSnapshot:
         ...
@@ -5865,6 +6186,365 @@ class SlamFile:
     @property
     def snapshot(self) -> SlamSnapshot:
         ...
+class FeatureTrackerOptions:
+    """
+    Options of the front end (FeatureTracker); every field is a keyword of the constructor.
+    """
+    def __init__(self, **kwargs) -> None:
+        """
+        TypeError for an unknown field, ValueError for a value out of range.
+        """
+    def check(self) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    @property
+    def avoid_frames(self) -> int:
+        """
+        For so long no new track begins where something moved.
+        """
+    @avoid_frames.setter
+    def avoid_frames(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def avoid_radius_px(self) -> float:
+        """
+        And so far around [px].
+        """
+    @avoid_radius_px.setter
+    def avoid_radius_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def direct_below_px(self) -> float:
+        """
+        Larger deviation of the prediction: Lucas-Kanade first [px].
+        """
+    @direct_below_px.setter
+    def direct_below_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def drop_after_rejected(self) -> int:
+        """
+        Times in a row by the filter.
+        """
+    @drop_after_rejected.setter
+    def drop_after_rejected(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def exposure_step(self) -> float:
+        """
+        Relative change of the mean brightness that is taken out.
+        """
+    @exposure_step.setter
+    def exposure_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def fast_threshold(self) -> int:
+        """
+        Of the brightness, for a corner to be looked at.
+        """
+    @fast_threshold.setter
+    def fast_threshold(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def klt_levels(self) -> int:
+        """
+        Of the pyramid, the picture itself included.
+        """
+    @klt_levels.setter
+    def klt_levels(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def klt_window_px(self) -> int:
+        """
+        Odd [px].
+        """
+    @klt_window_px.setter
+    def klt_window_px(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_search_px(self) -> float:
+        """
+        Larger deviation of the prediction: not searched for [px].
+        """
+    @max_search_px.setter
+    def max_search_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_tracks(self) -> int:
+        """
+        In one picture.
+        """
+    @max_tracks.setter
+    def max_tracks(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_warp(self) -> float:
+        """
+        By which a patch may be stretched before it is cut anew.
+        """
+    @max_warp.setter
+    def max_warp(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_corner(self) -> float:
+        """
+        Smaller eigenvalue of a corner [brightness^2/px^2].
+        """
+    @min_corner.setter
+    def min_corner(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_correlation(self) -> float:
+        """
+        Of a patch with the picture, for a track to go on.
+        """
+    @min_correlation.setter
+    def min_correlation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_refind_correlation(self) -> float:
+        """
+        For one that was lost.
+        """
+    @min_refind_correlation.setter
+    def min_refind_correlation(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_separation_px(self) -> float:
+        """
+        Of a new feature from the others [px].
+        """
+    @min_separation_px.setter
+    def min_separation_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def search_sigmas(self) -> float:
+        """
+        Size of the ellipse in which is searched.
+        """
+    @search_sigmas.setter
+    def search_sigmas(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma_px(self) -> float:
+        """
+        What the tracks say of themselves; NaN: nothing [px].
+        """
+    @sigma_px.setter
+    def sigma_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class TrackOrigin(enum.IntEnum):
+    """
+    How a feature was found in a picture.
+    """
+    CUT_ANEW: typing.ClassVar[TrackOrigin]
+    NEW: typing.ClassVar[TrackOrigin]
+    REFOUND: typing.ClassVar[TrackOrigin]
+    SEARCHED: typing.ClassVar[TrackOrigin]
+    TRACKED: typing.ClassVar[TrackOrigin]
+    @classmethod
+    def __new__(cls, value):
+        ...
+    def __format__(self, format_spec):
+        ...
+class TrackArrays:
+    """
+    How the features of one picture were found, a row each.
+    """
+    def __len__(self) -> int:
+        ...
+    @property
+    def age(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        (M,) int32, pictures in which it was seen before
+        """
+    @property
+    def correlation(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M,); NaN for a new one
+        """
+    @property
+    def id(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (M,) int64
+        """
+    @property
+    def origin(self) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        (M,) uint8, TrackOrigin
+        """
+class FeatureTrackerTimes:
+    """
+    How long the front end took for one picture [s].
+    """
+    @property
+    def detect_s(self) -> float:
+        ...
+    @property
+    def klt_s(self) -> float:
+        ...
+    @property
+    def pyramid_s(self) -> float:
+        ...
+    @property
+    def search_s(self) -> float:
+        ...
+    @property
+    def total_s(self) -> float:
+        ...
+class FeatureTracker:
+    """
+    From pictures to tracks: which feature is where in which picture. Alone, without a filter that tells where to look; ImageSlam has one.
+    """
+    def __init__(self, camera: CameraCalibration, options: FeatureTrackerOptions = ...) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    def counts(self) -> dict[str, int]:
+        """
+        {name: number}
+        """
+    def learn(self, frame: SlamFrame) -> None:
+        """
+        What became of the features: those that a filter rejects time and again are dropped.
+        """
+    def reset(self) -> None:
+        """
+        Forgets all tracks; identities go on.
+        """
+    def track(self, image: numpy.ndarray, time_ns: typing.SupportsInt | typing.SupportsIndex) -> FeaturesMeasurement:
+        """
+        image: uint8, (height, width) or (height, width, 3) with blue first. Gives its FeaturesMeasurement. ValueError for another size than the camera's.
+        """
+    @property
+    def last(self) -> TrackArrays:
+        """
+        TrackArrays of the last picture, in the order of its features.
+        """
+    @property
+    def options(self) -> FeatureTrackerOptions:
+        ...
+    @property
+    def times(self) -> FeatureTrackerTimes:
+        ...
+class SlamPredictionArrays:
+    """
+    Where the features of the map were expected in a picture, a row each.
+    """
+    def __len__(self) -> int:
+        ...
+    @property
+    def T_world_camera(self) -> Pose3:
+        ...
+    @property
+    def id(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (K,) int64
+        """
+    @property
+    def pixel_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K, 2)
+        """
+    @property
+    def search_cov(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K, 2, 2) of measured less expected [px^2]
+        """
+    @property
+    def time_ns(self) -> int | None:
+        """
+        of the picture; None before the first
+        """
+    @property
+    def valid(self) -> bool:
+        """
+        False: nothing was expected; no rows
+        """
+    @property
+    def visible(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        (K,) bool: expected in the picture; otherwise the rest means nothing
+        """
+class ImageSlam:
+    """
+    SLAM from pictures: a front end (FeatureTracker) and the estimator that options.motion names (MonoSlam, InertialSlam), which tells it where to look. Start with slam_options_for_images().
+    """
+    def __init__(self, options: SlamOptions, front_end: FeatureTrackerOptions = ...) -> None:
+        """
+        ValueError names a field that is out of range.
+        """
+    def counts(self) -> dict[str, int]:
+        """
+        Of the estimator and the front end: what was used and what was skipped, and why.
+        """
+    def estimate(self) -> Estimate:
+        ...
+    def finish(self) -> bool:
+        """
+        The end of a recording: frames that wait for the IMU are taken.
+        """
+    def frames(self) -> list[SlamFrame]:
+        """
+        [SlamFrame]: those that the last call has completed; with an IMU a frame waits for the sample after it.
+        """
+    def map(self) -> SlamMapArrays:
+        """
+        SlamMapArrays
+        """
+    def process(self, measurement: ImuMeasurement | MagnetometerMeasurement | ImageMeasurement | GpsMeasurement | ReferenceMeasurement | OdometryMeasurement | FeaturesMeasurement) -> bool:
+        """
+        The next measurement in time order: a picture that is decoded, or an IMU sample. Says whether estimate() is new.
+        """
+    def process_image(self, time_ns: typing.SupportsInt | typing.SupportsIndex, image: numpy.ndarray) -> bool:
+        """
+        A picture of the camera: uint8, (height, width) or (height, width, 3) with blue first. ValueError for another size than the camera's.
+        """
+    def process_imu(self, time_ns: typing.SupportsInt | typing.SupportsIndex, gyro: numpy.typing.ArrayLike, force: numpy.typing.ArrayLike) -> bool:
+        """
+        A sample of the IMU: gyro (3,) [rad/s], force (3,) [m/s^2], at rest +9.81 upwards.
+        """
+    def record(self, with_covariance: bool = True, with_features: bool = False) -> None:
+        """
+        From now on every frame is kept for recorded().
+        """
+    def recorded(self, stopped: bool = False) -> tuple[SlamRun, dict]:
+        """
+        What was kept since record(), which ends: a SlamRun with a row for each frame, and {name: (P,)} with a row for each picture: time_ns; tracks, of these searched, klt, cut_anew, refound, new; lost since the picture before; pyramid_s, search_s, klt_s, detect_s, their sum front_end_s, and picture_s, which has besides what the filter did during the picture's call.
+        """
+    def reset(self) -> None:
+        """
+        Forgets the past, not the options or the counts.
+        """
+    @property
+    def features(self) -> FeaturesMeasurement:
+        """
+        FeaturesMeasurement of the last picture.
+        """
+    @property
+    def options(self) -> SlamOptions:
+        """
+        A copy.
+        """
+    @property
+    def prediction(self) -> SlamPredictionArrays:
+        """
+        SlamPredictionArrays: by what the last picture was searched.
+        """
+    @property
+    def running(self) -> bool:
+        ...
+    @property
+    def times(self) -> FeatureTrackerTimes:
+        """
+        FeatureTrackerTimes of the last picture.
+        """
+    @property
+    def tracks(self) -> TrackArrays:
+        """
+        TrackArrays beside features.
+        """
 class ImuSampleModel(enum.Enum):
     """
     Which true value a reading of a simulated IMU stands for.
@@ -6612,6 +7292,10 @@ def box_room(random: Random, *, size_m: numpy.typing.ArrayLike = (8.0, 6.0, 3.0)
     """
     A room seen from inside, origin in the middle of its floor; one feature in each cell of its walls.
     """
+def calibrate_camera(target: CalibrationTarget, views: collections.abc.Sequence[TargetView], width_px: typing.SupportsInt | typing.SupportsIndex, height_px: typing.SupportsInt | typing.SupportsIndex, options: CameraFitOptions | None = None) -> CameraFit:
+    """
+    Intrinsics and distortion of a camera from the target's corners in several pictures. DataError when there is nothing to be solved.
+    """
 def calibrate_clock(times_ns: numpy.typing.NDArray[numpy.int64], host_times_ns: numpy.typing.NDArray[numpy.int64], **kwargs) -> ClockCalibrationResult:
     """
     Stamps and arrivals of one stream, int64 (N,) in the order of arrival; options as of ClockModel.
@@ -6628,6 +7312,14 @@ def chi_square_quantile(probability: typing.SupportsFloat | typing.SupportsIndex
     """
     x with P(X <= x) = probability. ValueError unless 0 <= probability < 1 and dof > 0.
     """
+def choose_views(target: CalibrationTarget, views: collections.abc.Sequence[TargetView], width_px: typing.SupportsInt | typing.SupportsIndex, height_px: typing.SupportsInt | typing.SupportsIndex, count: typing.SupportsInt | typing.SupportsIndex) -> list[int]:
+    """
+    Indices of at most so many views, as different as can be.
+    """
+def decode_image(image: ImageMeasurement, *, colour: bool = False) -> ImageMeasurement:
+    """
+    The same picture, grey or with blue first, whatever it is in. DataError for a damaged JPEG.
+    """
 def discretise(noise: ImuNoise, dt_s: typing.SupportsFloat | typing.SupportsIndex) -> DiscreteImuNoise:
     """
     Deviations of samples dt_s [s] apart.
@@ -6640,6 +7332,10 @@ def estimate_time_offset(times_ns: numpy.typing.NDArray[numpy.int64], positions:
     """
     By how much the stamps of a position stream are off against a reference trajectory in the same world (z up): t_reference = t_stream + offset_s. int64 (N,), float64 (N, 3) [m]; NaN rows are skipped. DataError names the index where times do not increase.
     """
+def euroc_cameras(folder: os.PathLike | str | bytes) -> list[int]:
+    """
+    The numbers of the cameras whose pictures are in a EuRoC / ASL recording, ascending.
+    """
 def example_drive() -> dict:
     """
     Arguments of WaypointMotion: the drive of the example 'Visual-Inertial Odometry Using Synthetic Data'.
@@ -6647,6 +7343,10 @@ def example_drive() -> dict:
 def find_stillness(times_ns: numpy.typing.NDArray[numpy.int64], gyroscope: numpy.typing.NDArray[numpy.float64] | None, accelerometer: numpy.typing.NDArray[numpy.float64] | None, options: StillnessOptions = ...) -> Stillness:
     """
     Still segments of a recording of any unit: int64 (N,) times, float64 (N, 3) readings; one sensor may be None. Bad data do not raise: see Stillness.quality.
+    """
+def finds_april_grids() -> bool:
+    """
+    True when AprilGrids can be found, not only checkerboards.
     """
 def fit_accelerometer(segments: collections.abc.Sequence[StillSegment], options: AccelerometerOptions = ...) -> AccelerometerFit:
     """
@@ -6675,6 +7375,14 @@ def format_seconds(time_ns: typing.SupportsInt | typing.SupportsIndex) -> str:
 def gps_from_unix(unix_time_ns: typing.SupportsInt | typing.SupportsIndex, *, leap_seconds: typing.SupportsInt | typing.SupportsIndex | None = None) -> int | None:
     """
     Nanoseconds since 1970 (UTC) to GPS time: since 1980-01-06, leap seconds counted. None before 1980 and after 2260. leap_seconds: GPS minus UTC, where the library's table is not to be used.
+    """
+def image_array(image: ImageMeasurement) -> numpy.typing.NDArray[numpy.uint8]:
+    """
+    An ImageMeasurement as uint8, (height, width) or (height, width, 3) in its own order. ValueError for a JPEG.
+    """
+def image_measurement(time_ns: typing.SupportsInt | typing.SupportsIndex, image: numpy.ndarray, camera: typing.SupportsInt | typing.SupportsIndex = 0) -> ImageMeasurement:
+    """
+    An ImageMeasurement of uint8, (height, width) or (height, width, 3) with blue first.
     """
 def imu_noise_from(allan: ImuAllan, fallback: ImuNoise = ...) -> ImuNoiseFit:
     """
@@ -6724,6 +7432,14 @@ def open_euroc(folder: os.PathLike | str | bytes, *, reference: bool = True, mag
     """
     A EuRoC / ASL recording: the folder that holds mav0.
     """
+def open_euroc_images(folder: os.PathLike | str | bytes, *, cameras: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], other: bool = True, reference: bool = True, colour: bool = False) -> MeasurementSource:
+    """
+    A EuRoC / ASL recording with its pictures. cameras: none are named: all. other: with IMU and all else.
+    """
+def open_image_folder(folder: os.PathLike | str | bytes, *, rate_hz: typing.SupportsFloat | typing.SupportsIndex = 0.0, first_time_ns: typing.SupportsInt | typing.SupportsIndex = 0, name_unit: str = '', times_file: os.PathLike | str | bytes | None = None, time_unit: str = '', camera: typing.SupportsInt | typing.SupportsIndex = 0, colour: bool = False) -> MeasurementSource:
+    """
+    A folder of pictures. One of these tells their times: rate_hz (the names are numbers), name_unit (the names are times in ns, us, ms, s), times_file; without any: rgb.txt or times.txt in the folder.
+    """
 def open_lcm_log(path: os.PathLike | str | bytes) -> MeasurementSource:
     """
     The measurements in an LCM log, in the order of the log: package loc's types and ASPN-23's. What cannot be decoded is counted.
@@ -6731,6 +7447,10 @@ def open_lcm_log(path: os.PathLike | str | bytes) -> MeasurementSource:
 def open_nmea(path: os.PathLike | str | bytes, *, reference_date: typing.Any | None = None, leap_seconds: typing.SupportsInt | typing.SupportsIndex | None = None, geoid_separation: typing.SupportsFloat | typing.SupportsIndex | None = None, sigma_per_dop: typing.SupportsFloat | typing.SupportsIndex = 0.0, accept_not_measured: bool = False) -> MeasurementSource:
     """
     The fixes of an NMEA log as a recording, on GPS time. Options as parse_nmea.
+    """
+def open_video(path: os.PathLike | str | bytes, *, camera: typing.SupportsInt | typing.SupportsIndex = 0, start_time_ns: typing.SupportsInt | typing.SupportsIndex = 0, rate_hz: typing.SupportsFloat | typing.SupportsIndex = 0.0, colour: bool = False) -> MeasurementSource:
+    """
+    The pictures of a video. start_time_ns: of the file's beginning. rate_hz: in place of the file's times.
     """
 def orientation_error(estimate_wxyz: numpy.typing.NDArray[numpy.float64], reference_wxyz: numpy.typing.NDArray[numpy.float64], mask: numpy.typing.NDArray[numpy.bool] | None = None, *, align_heading: bool = False) -> OrientationError:
     """
@@ -6808,6 +7528,10 @@ def simulate_gps_time(duration_s: typing.SupportsFloat | typing.SupportsIndex, r
     """
     (is_pulse, host_times_ns, gps_times_ns) as GpsClock.update takes them, then the truth second by second: host times and GPS times, int64 (M,).
     """
+def slam_options_for_images(options: SlamOptions) -> SlamOptions:
+    """
+    A copy that suits tracks of FeatureTracker: sigma_px, map.max_linearity_index, second_order_noise.
+    """
 def slam_options_text(options: SlamOptions) -> str:
     """
     As write_slam_options() writes it.
@@ -6823,6 +7547,18 @@ def unix_from_gps(gps_time_ns: typing.SupportsInt | typing.SupportsIndex, *, lea
 def update_rig(path: os.PathLike | str | bytes, change: collections.abc.Callable[[typing.Any], None]) -> Rig:
     """
     Reads rig.yaml (an empty rig when there is none), calls change(rig), which alters it, and writes it. What is not changed stays as it was to the last bit, but comments are lost. When anything raises, the file stays as it was.
+    """
+def write_geojson(path: os.PathLike | str | bytes, latitude_longitude_altitude: numpy.typing.NDArray[numpy.float64], *, utc_ns: numpy.typing.NDArray[numpy.int64] | None = None, sigma_horizontal: numpy.typing.NDArray[numpy.float64] | None = None, sigma_vertical: numpy.typing.NDArray[numpy.float64] | None = None, segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], name: str = 'path', description: str = '', geoid_height: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    """
+    GeoJSON (RFC 7946), arguments as of write_gpx; lines are cut at the antimeridian, altitudes are above the ellipsoid.
+    """
+def write_gpx(path: os.PathLike | str | bytes, latitude_longitude_altitude: numpy.typing.NDArray[numpy.float64], *, utc_ns: numpy.typing.NDArray[numpy.int64] | None = None, sigma_horizontal: numpy.typing.NDArray[numpy.float64] | None = None, sigma_vertical: numpy.typing.NDArray[numpy.float64] | None = None, segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], name: str = 'path', description: str = '', geoid_height: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    """
+    GPX 1.1: path (N, 3) [rad, rad, m above the ellipsoid], times int64 (N,) [ns since 1970, UTC], deviations (N,) [m]. segments: indices of points before which no line is drawn. geoid_height [m] is subtracted.
+    """
+def write_kml(path: os.PathLike | str | bytes, latitude_longitude_altitude: numpy.typing.NDArray[numpy.float64], *, utc_ns: numpy.typing.NDArray[numpy.int64] | None = None, sigma_horizontal: numpy.typing.NDArray[numpy.float64] | None = None, sigma_vertical: numpy.typing.NDArray[numpy.float64] | None = None, segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], name: str = 'path', description: str = '', geoid_height: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    """
+    KML 2.2, arguments as of write_gpx; deviations have no place in it.
     """
 def write_ply(path: os.PathLike | str | bytes, position: numpy.typing.NDArray[numpy.float64], id: numpy.typing.NDArray[numpy.int64], sigma: numpy.typing.NDArray[numpy.float64], *, comments: collections.abc.Sequence[str] = [], ascii: bool = False) -> int:
     """
@@ -6849,6 +7585,7 @@ def write_tum(path: os.PathLike | str | bytes, trajectory: Trajectory, frame: st
 ESTIMATE_CHANNEL: str = 'LOC_ESTIMATE'
 FUSION_CHANNEL: str = 'LOC_FUSION'
 GPS_CHANNEL: str = 'LOC_GPS'
+HAS_VISION: bool = True
 IMAGE_CHANNEL: str = 'LOC_IMAGE'
 IMU_CHANNEL: str = 'LOC_IMU'
 MAGNETOMETER_CHANNEL: str = 'LOC_MAGNETOMETER'
