@@ -228,6 +228,9 @@ int main(int argc, char** argv) {
       ->capture_default_str();
 
   return program.run(argc, argv, [&] {
+    if (arguments.slam.images && !arguments.slam.map_in.empty()) {
+      throw loc::UsageError("--map-in with --images: features of a saved map are not recognised in pictures");
+    }
     if (arguments.slam.images) become_program_with_images(argv);
     arguments.live.channels = loc::parse_channels(arguments.channels);
     arguments.live.merger.max_delay_ns = loc::from_seconds(arguments.reorder_delay_ms * 1e-3);

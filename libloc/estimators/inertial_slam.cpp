@@ -501,6 +501,10 @@ bool InertialSlam::finish() {
   ImuMeasurement same = last_imu_;
   same.time_ns = until_ns;
   take_frames_until(until_ns, same);
+  if (frame_count_ > 0 && filter_.time_ns() > last_.time_ns) {
+    last_.time_ns = filter_.time_ns();
+    any = true;
+  }
   return any;
 }
 

@@ -326,6 +326,8 @@ class RawlogSource final : public MeasurementSource {
   bool more_ = true;
 };
 
+struct DamagedPicture {};  // a JPEG that cannot be decoded: the others are written all the same
+
 class RawlogWriter final : public RecordingWriter {
  public:
   explicit RawlogWriter(const fs::path& path) : file_(path) {
@@ -334,8 +336,12 @@ class RawlogWriter final : public RecordingWriter {
 
   void write(const Measurement& measurement) override {
     const std::string name = stream_name(kind_of(measurement));
-    const bool room = std::visit([this](const auto& m) { return put(m); }, measurement);
-    ++counts_[name + (room ? ".written" : ".no_room")];
+    try {
+      const bool room = std::visit([this](const auto& m) { return put(m); }, measurement);
+      ++counts_[name + (room ? ".written" : ".no_room")];
+    } catch (const DamagedPicture&) {
+      ++counts_[name + ".skipped.damaged"];
+    }
   }
   void write(const ReferenceMeasurement& /*reference*/, const ReferenceBiases& /*biases*/) override {
     ++counts_["reference.no_room"];
@@ -385,8 +391,13 @@ class RawlogWriter final : public RecordingWriter {
     return put_observation(out, m, "magnetometer");
   }
   bool put(const ImageMeasurement& m) {
-    const ImageMeasurement image = decode_image(
-        m, m.format == PixelFormat::kBgr || m.format == PixelFormat::kRgb ? PixelFormat::kBgr : PixelFormat::kGray);
+    const bool colour = m.format == PixelFormat::kBgr || m.format == PixelFormat::kRgb;
+    ImageMeasurement image;
+    try {
+      image = decode_image(m, colour ? PixelFormat::kBgr : PixelFormat::kGray);
+    } catch (const DataError&) {
+      throw DamagedPicture();
+    }
     const bool grey = image.format == PixelFormat::kGray;
     obs::CObservationImage out;
     out.image = mrpt::img::CImage(static_cast<unsigned>(image.width_px), static_cast<unsigned>(image.height_px),

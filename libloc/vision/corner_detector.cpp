@@ -5,6 +5,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>
 
+#include "libloc/core/check.hpp"
+
 namespace loc {
 namespace {
 
@@ -12,6 +14,14 @@ constexpr int kWindowHalf = 3;
 constexpr std::size_t kLookedAt = 6;  // of the candidates of one cell, by their response to FAST
 
 }  // namespace
+
+void CornerOptions::check() const {
+  require(columns >= 1 && columns <= 10000, "columns", columns, "must be in [1, 10000]");
+  require(rows >= 1 && rows <= 10000, "rows", rows, "must be in [1, 10000]");
+  require(fast_threshold >= 1 && fast_threshold <= 254, "fast_threshold", fast_threshold, "must be in [1, 254]");
+  require(border_px > kWindowHalf, "border_px", border_px, "must be 4 or more");
+  require(min_separation_px >= 0, "min_separation_px", min_separation_px, "must not be negative");
+}
 
 double corner_strength(const GrayView& image, int x, int y) {
   int xx = 0;
@@ -37,6 +47,7 @@ double corner_strength(const GrayView& image, int x, int y) {
 
 void find_corners(const GrayView& image, std::span<const Eigen::Vector2d> taken, const CornerOptions& options,
                   std::vector<Corner>& out) {
+  options.check();
   out.clear();
   if (options.most <= 0) return;
   const double cell_width = static_cast<double>(image.width) / options.columns;

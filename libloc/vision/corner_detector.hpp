@@ -23,13 +23,16 @@ struct CornerOptions {
   double min_strength = 60;
   int border_px = kPatchHalf + 3;
   double min_separation_px = 14;  ///< from the places given, and from each other
+
+  /// @throws std::invalid_argument naming the field and its value.
+  void check() const;
 };
 
 /// Smaller eigenvalue around a pixel at least 4 from the border.
 double corner_strength(const GrayView& image, int x, int y);
 
 /// @param taken places of the features that are there already; cells with one of them are left out
-/// @param out replaced
+/// @param out replaced @throws std::invalid_argument as CornerOptions::check.
 void find_corners(const GrayView& image, std::span<const Eigen::Vector2d> taken, const CornerOptions& options,
                   std::vector<Corner>& out);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
@@ -30,12 +31,15 @@ constexpr double kKltDisagrees = 1.5;  // two ways from the last picture to this
 constexpr int kMostKltSteps = 20;
 constexpr double kKltConverged = 0.03;  // [px]
 constexpr double kKltEigenvalue = 1e-3;
-constexpr double kVagueGuess = 60;   // deviation of a place that is no guess any more [px]
-constexpr double kTwins = 5;         // two tracks nearer than this are one feature [px]
-constexpr int kBrightnessStep = 4;   // every so many pixels count for the mean brightness
-constexpr double kStillPx = 1;       // a picture that is nearer to where it was stands still …
-constexpr double kStillTime = 1;     // … when it has been for so long [s]
-constexpr double kMostSigmaPx = 30;  // of a standing picture; more says nothing either
+constexpr double kVagueGuess = 60;  // deviation of a place that is no guess any more [px]
+constexpr double kTwins = 5;        // two tracks nearer than this are one feature [px]
+constexpr int kBrightnessStep = 4;  // every so many pixels count for the mean brightness
+constexpr double kStillPx = 1;      // a picture that is nearer to where it was stands still …
+constexpr double kStillTime = 1;    // … when it has been for so long [s]
+constexpr TimeNs kLongestPauseNs = 1'000'000'000;
+constexpr double kMostSigmaPx = 30;    // of a standing picture; more says nothing either
+constexpr int kRemembered = 200;       // pictures in which nobody expects what is not seen
+constexpr double kMostPlaces = 20000;  // at which lost features are looked for in one picture: some 2 ms
 constexpr double kBorder = kPatchHalf + 2;
 
 double seconds_since(Clock::time_point begin) {
@@ -83,6 +87,7 @@ struct Track {
   bool seen = false;                                  // in this picture
   bool was_seen = false;                              // in the one before
   int age = 0;
+  int unseen = 0;    // pictures since it was seen
   int rejected = 0;  // in a row
   bool in_map = false;
   TrackOrigin origin = TrackOrigin::kNew;
@@ -145,13 +150,20 @@ struct FeatureTracker::Work {
   Brightness before_brightness;
   std::vector<cv::Mat> pyramid;
   std::vector<cv::Mat> before_pyramid;
+  // The picture before, with the exposure of this one.
+  cv::Mat adjusted;
+  std::vector<cv::Mat> adjusted_pyramid;
+  bool is_adjusted = false;
   std::vector<Track> tracks;
   std::int64_t next_id = 0;
-  std::int64_t picture = 0;
+  std::int64_t picture = 0;   // since the last reset
+  std::int64_t pictures = 0;  // in all
+  std::int64_t first_searched = 0;
   Pose3 T_world_before;  // camera, of the picture before
   bool has_before_pose = false;
   FeaturesMeasurement out;
   PictureRest rest;
+  TimeNs rest_time_ns = kNoTime;
   int still_pictures = 0;  // in a row
   std::vector<TrackedFeature> tracked;
   FeatureTrackerTimes times;
@@ -189,6 +201,7 @@ struct FeatureTracker::Work {
   void confirm(Track& track, const Eigen::Vector2d& place, const SlamPrediction* expected);
   bool cut(Track& track, const Eigen::Vector2d& place, const SlamPrediction* expected) const;
   void remove_twins();
+  double places_of(const SlamFeaturePrediction& there) const;
   bool is_blind() const;
   void forget_picture();
   void detect(const SlamPrediction* expected);
@@ -215,15 +228,16 @@ void FeatureTracker::Work::take_picture(const ImageMeasurement& image) {
   const Brightness& now = brightness;
   const Brightness& was = before_brightness;
   const bool step = picture > 0 && std::abs(now.mean - was.mean) > options.exposure_step * std::max(now.mean, was.mean);
-  if (step && was.deviation > 1 && now.deviation > 1) {
+  is_adjusted = step && was.deviation > 1 && now.deviation > 1;
+  if (is_adjusted) {
     // The picture before as it would be with this exposure.
     ++exposure_steps;
     const double gain = now.deviation / was.deviation;
-    cv::Mat adjusted;
     before_gray.convertTo(adjusted, CV_8U, gain, now.mean - gain * was.mean);
-    cv::buildOpticalFlowPyramid(adjusted, before_pyramid, window, options.klt_levels - 1, true);
+    cv::buildOpticalFlowPyramid(adjusted, adjusted_pyramid, window, options.klt_levels - 1, true);
   }
   ++picture;
+  ++pictures;
 }
 
 void FeatureTracker::Work::take_prediction(const SlamPrediction* expected) {
@@ -236,12 +250,15 @@ void FeatureTracker::Work::take_prediction(const SlamPrediction* expected) {
     track.expected = found == by_id.end() ? nullptr : found->second;
     if (expected != nullptr) track.in_map = track.expected != nullptr;
     track.last_px = track.pixel_px;
+    track.unseen = track.seen ? 0 : track.unseen + 1;
     track.was_seen = track.seen;
     track.seen = false;
     track.correlation = kUnknown;
   }
-  // What is neither seen nor in the map will not come back.
-  std::erase_if(tracks, [](const Track& track) { return !track.was_seen && !track.in_map; });
+  // What is neither seen nor in the map will not come back, nor what nobody expects for long.
+  std::erase_if(tracks, [&](const Track& track) {
+    return !track.was_seen && (!track.in_map || (expected == nullptr && track.unseen > kRemembered));
+  });
 }
 
 // How offsets around the feature where its patch was cut come to offsets around it now: the surface is taken to face
@@ -364,8 +381,9 @@ void FeatureTracker::Work::run_klt(const SlamPrediction* expected) {
   if (klt.empty()) return;
   const cv::Size window(options.klt_window_px, options.klt_window_px);
   const cv::TermCriteria until(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, kMostKltSteps, kKltConverged);
-  cv::calcOpticalFlowPyrLK(before_pyramid, pyramid, klt_from, klt_to, klt_status, klt_error, window,
-                           options.klt_levels - 1, until, cv::OPTFLOW_USE_INITIAL_FLOW, kKltEigenvalue);
+  cv::calcOpticalFlowPyrLK(is_adjusted ? adjusted_pyramid : before_pyramid, pyramid, klt_from, klt_to, klt_status,
+                           klt_error, window, options.klt_levels - 1, until, cv::OPTFLOW_USE_INITIAL_FLOW,
+                           kKltEigenvalue);
   for (std::size_t k = 0; k < klt.size(); ++k) {
     const Eigen::Vector2d place(klt_to[k].x, klt_to[k].y);
     if (klt_status[k] != 0 && camera.in_image(place, kBorder)) confirm(tracks[klt[k]], place, expected);
@@ -410,6 +428,12 @@ void FeatureTracker::Work::detect(const SlamPrediction* expected) {
   }
 }
 
+// Whole pixels in the ellipse.
+double FeatureTracker::Work::places_of(const SlamFeaturePrediction& there) const {
+  return std::numbers::pi * options.search_sigmas * options.search_sigmas *
+         std::sqrt(std::max(0.0, there.search_cov.determinant()));
+}
+
 // Nothing in it: the lens is covered, or all is black or white.
 bool FeatureTracker::Work::is_blind() const {
   return !tracks.empty() && std::none_of(tracks.begin(), tracks.end(), [](const Track& track) { return track.seen; });
@@ -449,6 +473,10 @@ void FeatureTracker::Work::give_out(const ImageMeasurement& image) {
     cut_anew += track.origin == TrackOrigin::kCutAnew ? 1 : 0;
     refound += track.origin == TrackOrigin::kRefound ? 1 : 0;
   }
+  // A pause, or a clock that was set: what stood before says nothing.
+  if (rest_time_ns == kNoTime || out.time_ns <= rest_time_ns || out.time_ns - rest_time_ns > kLongestPauseNs)
+    rest.reset();
+  rest_time_ns = out.time_ns;
   rest.see(out, out.time_ns);
   still_pictures = rest.stands_still(out.time_ns) ? still_pictures + 1 : 0;
   out.sigma_px = options.sigma_px * std::sqrt(1.0 + still_pictures);
@@ -471,14 +499,22 @@ const FeaturesMeasurement& FeatureTracker::track(const ImageMeasurement& image, 
   const auto search_begin = Clock::now();
   w.take_prediction(expected);
   w.klt.clear();
-  for (std::size_t i = 0; i < w.tracks.size(); ++i) {
+  double places = 0;
+  for (std::size_t k = 0; k < w.tracks.size(); ++k) {
+    // Another one first in every picture, so that each gets its turn when there are too many.
+    const std::size_t i = (k + static_cast<std::size_t>(w.first_searched)) % w.tracks.size();
     Track& track = w.tracks[i];
     const bool visible = track.expected != nullptr && track.expected->visible;
     const double sigma = visible ? largest_sigma(track.expected->search_cov) : 0;
     const double limit = track.was_seen ? w.options.direct_below_px : w.options.max_search_px;
-    const bool found = visible && sigma <= limit && w.search(track, expected);
+    bool found = false;
+    if (visible && sigma <= limit && (track.was_seen || places < kMostPlaces)) {
+      found = w.search(track, expected);
+      if (!track.was_seen) places += w.places_of(*track.expected);
+    }
     if (!found && track.was_seen) w.klt.push_back(i);
   }
+  w.first_searched += places < kMostPlaces ? 0 : 1;
   w.times.search_s = seconds_since(search_begin);
 
   const auto klt_begin = Clock::now();
@@ -526,6 +562,8 @@ void FeatureTracker::reset() {
   w.has_before_pose = false;
   w.rest.reset();
   w.still_pictures = 0;
+  w.out.features.clear();
+  w.tracked.clear();
 }
 
 const std::vector<TrackedFeature>& FeatureTracker::last() const {
@@ -542,7 +580,7 @@ const FeatureTrackerOptions& FeatureTracker::options() const {
 
 NamedCounts FeatureTracker::counts() const {
   const Work& w = *work_;
-  return {{"pictures", w.picture},         {"pictures.exposure_steps", w.exposure_steps},
+  return {{"pictures", w.pictures},        {"pictures.exposure_steps", w.exposure_steps},
           {"pictures.blind", w.blind},     {"tracks.new", w.added},
           {"tracks.searched", w.searched}, {"tracks.klt", w.tracked_klt},
           {"tracks.cut_anew", w.cut_anew}, {"tracks.refound", w.refound},

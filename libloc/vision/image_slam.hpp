@@ -5,6 +5,7 @@
 //   for (const Measurement& m : measurements) slam.process(m);    // pictures, IMU, in the order of their times
 #pragma once
 
+#include "libloc/core/check.hpp"
 #include "libloc/estimators/inertial_slam.hpp"
 #include "libloc/estimators/mono_slam.hpp"
 #include "libloc/vision/feature_tracker.hpp"
@@ -21,12 +22,20 @@ inline SlamOptions slam_options_for_images(SlamOptions options) {
   return options;
 }
 
+/// A tracker gives identities of its own, which are nobody's that is known beforehand.
+/// @throws std::invalid_argument for options with landmarks.
+inline void check_landmarks(const SlamOptions& options) {
+  require(options.landmarks.empty(), "landmarks: their identities mean nothing to a front end that finds its own");
+}
+
 template <class Slam>
 class ImageSlam {
  public:
   /// @throws std::invalid_argument as the estimator's and FeatureTrackerOptions::check.
   explicit ImageSlam(const SlamOptions& options, const FeatureTrackerOptions& front_end = {})
-      : slam_(options), tracker_(options.camera, front_end), camera_(options.camera_index) {}
+      : slam_((check_landmarks(options), options)),
+        tracker_(options.camera, front_end),
+        camera_(options.camera_index) {}
 
   // Estimator concept. Pictures of other cameras, and tracks, are not for it.
   /// @throws std::invalid_argument for a picture of another size than the camera's, or a JPEG that is not decoded.

@@ -90,6 +90,10 @@ class VideoSource final : public MeasurementSource {
     const double given_rate = options_.rate_hz;
     const auto n = static_cast<double>(frame_);
     double time_s = n / given_rate;
+    if (given_rate != 0 && !(time_s * 1e3 < kLongestVideoMs)) {
+      throw DataError(path_.string() + ": frame " + std::to_string(frame_) + " at " + std::to_string(given_rate) +
+                      " Hz is years after the first: another rate was meant");
+    }
     if (given_rate == 0) {
       const double container_s = container_ms_ * 1e-3;
       const bool usable = std::isfinite(container_s) && container_ms_ >= 0 && container_ms_ < kLongestVideoMs &&

@@ -196,6 +196,12 @@ class PyImageSlam {
 bool PyImageSlam::process(const Measurement& measurement) {
   const Working working(busy_);
   const py::gil_scoped_release no_gil;
+  frames_.clear();
+  // Pictures of other cameras and tracks are not for it: what it says is of before.
+  if (std::holds_alternative<FeaturesMeasurement>(measurement) ||
+      (std::holds_alternative<loc::ImageMeasurement>(measurement) && loc::camera_of(measurement) != camera_)) {
+    return false;
+  }
   const auto begin = std::chrono::steady_clock::now();
   const bool is_new = visit([&](auto& slam) { return slam.process(measurement); });
   const double spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -307,7 +313,6 @@ void bind_front_end(py::module_& m) {
           [](FeatureTracker& self, const py::array& image, loc::TimeNs time_ns) {
             loc::ImageMeasurement picture = image_from(image);
             picture.time_ns = time_ns;
-            const py::gil_scoped_release no_gil;
             return FeaturesMeasurement(self.track(picture));
           },
           py::arg("image"), py::arg("time_ns"),

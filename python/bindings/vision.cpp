@@ -157,7 +157,6 @@ void bind_video(py::module_& m) {
       .def(
           "add",
           [](FeatureVideo& self, const loc::FeaturesMeasurement& features, const ImageMeasurement* picture) {
-            const py::gil_scoped_release no_gil;
             self.add(features, picture);
           },
           py::arg("features"), py::arg("picture") = py::none(), "picture: ImageMeasurement; None: white.")
@@ -185,7 +184,6 @@ void bind_detector(py::module_& m) {
           "detect",
           [](const TargetDetector& self, const py::array& image) {
             const loc::ImageMeasurement picture = image_from(image);
-            const py::gil_scoped_release release;
             return self.detect(picture);
           },
           py::arg("image"), "image: uint8, (height, width) or (height, width, 3) with blue first.");

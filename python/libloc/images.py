@@ -195,7 +195,7 @@ def run_image_slam(
         except DataError:
             counts["image.skipped.damaged"] = counts.get("image.skipped.damaged", 0) + 1
             continue
-        feed_until(picture.time_ns + offset_ns)
+        feed_until(picture.time_ns)
         slam.process(picture)
         last_ns = picture.time_ns
         first_ns = last_ns if first_ns is None else first_ns

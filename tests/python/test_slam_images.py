@@ -223,12 +223,12 @@ def test_the_program_on_a_folder(ride, folder, tmp_path, capsys):
 
 
 def test_the_program_on_a_log(ride, folder, tmp_path, capsys):
-    """Pictures and IMU in one log; one of the pictures is a damaged JPEG."""
+    """Pictures and IMU in one log, pictures 40 ms later than they were taken; one of them is a damaged JPEG."""
     path = tmp_path / "ride.lcm"
-    events = [(int(t), "imu", i) for i, t in enumerate(ride.imu.times_ns)]
-    events += [(int(t), "picture", i) for i, t in enumerate(ride.times_ns)]
+    events = [(int(t), int(t), "imu", i) for i, t in enumerate(ride.imu.times_ns)]
+    events += [(int(t) + 40_000_000, int(t), "picture", i) for i, t in enumerate(ride.times_ns)]
     with LogWriter(path) as log:
-        for time_ns, kind, i in sorted(events):
+        for arrived_ns, time_ns, kind, i in sorted(events):
             if kind == "imu":
                 m = loc.imu_t()
                 m.angular_velocity = ride.imu.angular_velocity[i].tolist()
@@ -242,8 +242,8 @@ def test_the_program_on_a_log(ride, folder, tmp_path, capsys):
                     m.pixelformat, m.row_stride = m.PIXEL_FORMAT_MJPEG, 0
                     m.data = b"\xff\xd8\xff\xe0" + bytes(200) + b"\xff\xd9"
                 m.size = len(m.data)
-            m.time_ns, m.host_time_ns, m.sequence = time_ns, time_ns, i
-            log.write("LOC_IMU" if kind == "imu" else "LOC_IMAGE", m, time_ns // 1000)
+            m.time_ns, m.host_time_ns, m.sequence = time_ns, arrived_ns, i
+            log.write("LOC_IMU" if kind == "imu" else "LOC_IMAGE", m, arrived_ns // 1000)
     out = tmp_path / "out"
     arguments = [path, "--config", folder / "rig.yaml", "--method", "inertial-slam", "--no-plots"]
     assert call(*arguments, "--reference", folder / "truth.tum", "--output", out) == 0

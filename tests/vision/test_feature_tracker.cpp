@@ -411,6 +411,22 @@ TEST(FeatureTracker, SurvivesDroppedPictures) {
   EXPECT_GT(result.kept, 0.8);
 }
 
+// A hand before the lens: dark, and noise all over. The picture before it keeps its own exposure.
+TEST(FeatureTracker, SurvivesACoveredLens) {
+  RoomCamera room(test::small_camera());
+  FeatureTracker tracker(room.calibration());
+  Random random(3);
+  const RideResult result =
+      ride(tracker, room, {.pictures = 14, .change = [&](int i, const ImageMeasurement& image) {
+                             return std::optional(i != 7 ? image : test::changed(image, [&](double, int, int) {
+                               return 5 + 2 * random.normal();
+                             }));
+                           }});
+  EXPECT_EQ(count_of(tracker.counts(), "pictures.blind"), 1);
+  EXPECT_LT(result.rms_px, 0.3);
+  EXPECT_GT(result.kept, 0.8);
+}
+
 TEST(FeatureTracker, FollowsPureRotation) {
   RoomCamera room(test::small_camera());
   FeatureTracker tracker(room.calibration());

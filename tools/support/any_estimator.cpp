@@ -88,6 +88,12 @@ bool AnyEstimator::takes_late(StreamKind kind) const {
 void AnyEstimator::set_front_end(std::unique_ptr<PictureFrontEnd> front_end) {
   require(std::holds_alternative<MonoSlam>(implementation_) || std::holds_alternative<InertialSlam>(implementation_),
           "method '" + method_ + "' has no use for pictures");
+  // The front end counts its features from 0, whoever had these numbers before.
+  const SlamOptions& options = std::holds_alternative<MonoSlam>(implementation_)
+                                   ? std::get<MonoSlam>(implementation_).options()
+                                   : std::get<InertialSlam>(implementation_).options();
+  require(!start_ && options.landmarks.empty(),
+          "pictures: features of a saved map or known landmarks are not recognised");
   front_end_ = std::move(front_end);
   inputs_ = {StreamKind::kImu, StreamKind::kImage};
 }
@@ -98,7 +104,8 @@ bool AnyEstimator::process_with_pictures(Slam& slam, const Measurement& measurem
   bool is_new = false;
   if (image == nullptr) {
     is_new = slam.process(measurement);
-  } else if (image->camera == slam.options().camera_index) {
+  } else {
+    if (image->camera != slam.options().camera_index) return false;
     slam.predict_frame(image->time_ns, expected_);
     const FeaturesMeasurement* features = front_end_->track(*image, expected_);
     if (features == nullptr) return false;
@@ -106,12 +113,13 @@ bool AnyEstimator::process_with_pictures(Slam& slam, const Measurement& measurem
     is_new = slam.process(features_);
   }
   gave_estimate_ = is_new;
+  frames_are_new_ = true;
   for (const SlamFrame& frame : slam_frames()) front_end_->learn(frame);
   return is_new;
 }
 
 bool AnyEstimator::process(const Measurement& measurement) {
-  gave_estimate_ = false;
+  gave_estimate_ = frames_are_new_ = false;
   auto* mono = std::get_if<MonoSlam>(&implementation_);
   auto* inertial = std::get_if<InertialSlam>(&implementation_);
   if (front_end_ != nullptr && mono != nullptr) {
@@ -120,6 +128,7 @@ bool AnyEstimator::process(const Measurement& measurement) {
     gave_estimate_ = process_with_pictures(*inertial, measurement);
   } else {
     gave_estimate_ = std::visit([&](auto& estimator) { return estimator.process(measurement); }, implementation_);
+    frames_are_new_ = true;
   }
   return gave_estimate_;
 }
@@ -127,6 +136,7 @@ bool AnyEstimator::process(const Measurement& measurement) {
 bool AnyEstimator::finish() {
   gave_estimate_ = false;
   auto* inertial = std::get_if<InertialSlam>(&implementation_);
+  frames_are_new_ = inertial != nullptr;
   if (inertial != nullptr) gave_estimate_ = inertial->finish();
   return gave_estimate_;
 }
@@ -145,12 +155,13 @@ NamedCounts AnyEstimator::counts() const {
 
 void AnyEstimator::reset() {
   std::visit([](auto& estimator) { estimator.reset(); }, implementation_);
-  gave_estimate_ = false;
+  gave_estimate_ = frames_are_new_ = false;
   if (front_end_ != nullptr) front_end_->reset();
   restore();
 }
 
 std::span<const SlamFrame> AnyEstimator::slam_frames() const {
+  if (!frames_are_new_) return {};
   if (const auto* inertial = std::get_if<InertialSlam>(&implementation_)) return inertial->frames();
   const auto* mono = std::get_if<MonoSlam>(&implementation_);
   if (mono == nullptr || !gave_estimate_) return {};

@@ -78,7 +78,8 @@ class AnyEstimator {
   std::unique_ptr<PictureFrontEnd> front_end_;
   SlamPrediction expected_;
   Measurement features_ = FeaturesMeasurement{};
-  bool gave_estimate_ = false;  // the last process()
+  bool gave_estimate_ = false;   // the last process()
+  bool frames_are_new_ = false;  // it came to the estimator
 };
 static_assert(Estimator<AnyEstimator>);
 

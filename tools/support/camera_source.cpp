@@ -16,6 +16,7 @@
 namespace loc {
 namespace {
 
+constexpr int kDamagedInARow = 30;  // pictures: the camera is of no use
 constexpr auto kStep = std::chrono::milliseconds(50);
 // A stamp that is older, or in the future by more than reading two clocks takes, is of another clock.
 constexpr TimeNs kOldestStamp = 2'000'000'000;
@@ -194,11 +195,13 @@ class CameraSource final : public MeasurementSource {
     ImageMeasurement image = std::move(grabbed.frame.image);
     try {
       if (options_.convert) image = options_.convert(std::move(image));
-    } catch (const DataError& error) {
+    } catch (const std::exception& error) {
       if (damaged_++ == 0)
         log_warning(R"(event=picture_damaged name="{}" reason="{}")", connection_.name, error.what());
+      if (++damaged_in_a_row_ == kDamagedInARow) reconnection_.trouble("sends only damaged pictures");
       return std::nullopt;
     }
+    damaged_in_a_row_ = 0;
     reconnection_.trouble("");
     if (time_ns <= last_time_ns_ && last_time_ns_ - time_ns < kOldestStamp) {
       ++not_increasing_;
@@ -220,6 +223,7 @@ class CameraSource final : public MeasurementSource {
   std::int64_t sequence_ = 0;
   std::int64_t dropped_ = 0;  // by threads that have ended
   std::int64_t damaged_ = 0;
+  int damaged_in_a_row_ = 0;
   std::int64_t not_increasing_ = 0;
   std::int64_t by_kernel_ = 0;
   std::int64_t at_arrival_ = 0;

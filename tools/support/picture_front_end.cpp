@@ -1,6 +1,6 @@
 #include "tools/support/picture_front_end.hpp"
 
-#include <stdexcept>
+#include <exception>
 
 #include "libloc/core/check.hpp"
 #include "libloc/vision/feature_tracker.hpp"
@@ -21,7 +21,7 @@ class Tracking final : public PictureFrontEnd {
       return &tracker_.track(decode_image(image), &expected);
     } catch (const DataError& error) {
       skip(damaged_, image, error);
-    } catch (const std::invalid_argument& error) {
+    } catch (const std::exception& error) {  // of OpenCV and TurboJPEG, too: one picture must not end a live program
       skip(not_usable_, image, error);
     }
     return nullptr;

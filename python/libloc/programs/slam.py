@@ -310,8 +310,8 @@ def _run_pictures(
             given.pictures.open(),
             slam,
             front_end=front_end,
-            # An LCM log gives the IMU by itself, in its order.
-            imu=None if given.pictures.form == "lcm" else given.imu,
+            # In a log pictures stand where they arrived, after samples that are later than they are.
+            imu=given.imu,
             rig=given.rig,
             watch=watcher,
             progress=go_on,
