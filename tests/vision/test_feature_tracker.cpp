@@ -424,7 +424,7 @@ TEST(FeatureTracker, SurvivesACoveredLens) {
                            }});
   EXPECT_EQ(count_of(tracker.counts(), "pictures.blind"), 1);
   EXPECT_LT(result.rms_px, 0.3);
-  EXPECT_GT(result.kept, 0.8);
+  EXPECT_GT(result.alive, 0.8);
 }
 
 TEST(FeatureTracker, FollowsPureRotation) {
