@@ -223,7 +223,7 @@ def test_the_program_on_a_folder(ride, folder, tmp_path, capsys):
 
 
 def test_the_program_on_a_log(ride, folder, tmp_path, capsys):
-    """Pictures and IMU in one log, pictures 40 ms later than they were taken; one of them is a damaged JPEG."""
+    """Pictures and IMU in one log, pictures arriving 40 ms late; one of them is a damaged JPEG."""
     path = tmp_path / "ride.lcm"
     events = [(int(t), int(t), "imu", i) for i, t in enumerate(ride.imu.times_ns)]
     events += [(int(t) + 40_000_000, int(t), "picture", i) for i, t in enumerate(ride.times_ns)]
