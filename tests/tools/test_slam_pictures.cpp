@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "libloc/eval/trajectory_error.hpp"
 #include "libloc/io/rig_yaml.hpp"
@@ -47,9 +48,10 @@ class SlamPictures : public ::testing::Test {
         image.data = bytes;
       }
       all.emplace_back(image);
+      if (i % 10 != 0) continue;
       ImageMeasurement other = room.at(ride(0), image.time_ns);
       other.camera = 1;
-      other.sequence = i;
+      other.sequence = i / 10;
       all.emplace_back(other);
     }
     for (int i = 0; i < static_cast<int>(kSeconds / 0.005); ++i) {
@@ -99,13 +101,21 @@ TEST_F(SlamPictures, OffLineAndLiveFindTheWay) {
 
 TEST_F(SlamPictures, LiveIsTheSameWhenNothingIsDropped) {
   ASSERT_EQ(offline("inertial-slam", {"--map-out", path("offline.slam")}), 0) << errors();
-  ASSERT_EQ(
-      run("loc-live",
-          {"lcm-log", path("ride.lcm"), "--config", path("rig.yaml"), "--transport", "hub", "--speed", "0.5", "--log",
-           path("live.lcm"), "--estimator-args", "--method inertial-slam --images --map-out " + path("live.slam")},
-          path("err")),
-      0)
-      << errors();
+  // A live estimator drops the oldest of four pictures when the machine is busy with other things: slower then.
+  std::int64_t dropped = 1;
+  for (const std::string speed : {"0.5", "0.2"}) {
+    if (dropped == 0) break;
+    std::filesystem::remove(path("live.lcm"));
+    ASSERT_EQ(
+        run("loc-live",
+            {"lcm-log", path("ride.lcm"), "--config", path("rig.yaml"), "--transport", "hub", "--speed", speed, "--log",
+             path("live.lcm"), "--estimator-args", "--method inertial-slam --images --map-out " + path("live.slam")},
+            path("err")),
+        0)
+        << errors();
+    dropped = figure(errors(), " image.dropped=", "image.dropped");
+  }
+  ASSERT_EQ(dropped, 0) << errors();
   EXPECT_EQ(read_file(path("live.slam")), read_file(path("offline.slam")));
 }
 
