@@ -11,6 +11,7 @@
 #include "libloc/geometry/so3.hpp"
 #include "libloc/sim/camera.hpp"
 #include "libloc/sim/room.hpp"
+#include "tests/support/camera_models.hpp"
 #include "tests/support/numeric_jacobian.hpp"
 
 namespace loc {
@@ -31,13 +32,7 @@ class Turning : public Motion {
 };
 
 CameraCalibration calibration() {
-  CameraCalibration c;
-  c.name = "cam0";
-  c.width_px = 752;
-  c.height_px = 480;
-  c.intrinsics_px = {458.654, 457.296, 367.215, 248.375};
-  c.distortion_model = DistortionModel::kRadtan;
-  c.distortion = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05};
+  CameraCalibration c = test::radtan_camera();
   // Looks along the body's x, a little off.
   Eigen::Matrix3d R;
   R << 0, 0, 1, -1, 0, 0, 0, -1, 0;

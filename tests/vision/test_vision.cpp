@@ -19,6 +19,7 @@
 #include "libloc/vision/feature_video.hpp"
 #include "libloc/vision/image_file.hpp"
 #include "libloc/vision/image_view.hpp"
+#include "tests/support/camera_models.hpp"
 #include "tests/support/temp_folder.hpp"
 #ifdef LOC_APRILTAG
 #include <apriltag/apriltag.h>
@@ -29,25 +30,6 @@ namespace loc {
 namespace {
 
 using test::TempFolder;
-
-CameraCalibration euroc() {
-  CameraCalibration c;
-  c.name = "cam0";
-  c.width_px = 752;
-  c.height_px = 480;
-  c.intrinsics_px = {458.654, 457.296, 367.215, 248.375};
-  c.distortion_model = DistortionModel::kRadtan;
-  c.distortion = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05};
-  return c;
-}
-
-CameraCalibration fisheye() {
-  CameraCalibration c = euroc();
-  c.intrinsics_px = {260, 260, 370.931, 236.897};
-  c.distortion_model = DistortionModel::kEquidistant;
-  c.distortion = {0.0034823894, 0.0007150348, -0.0020532361, 0.00020293673};
-  return c;
-}
 
 /// The camera in front of a target, its image upright: target is x right, y up, z towards the camera.
 Pose3 in_front(const Eigen::Vector3d& middle, double distance, const Eigen::Vector3d& turned) {
@@ -70,7 +52,7 @@ std::optional<Eigen::Vector2d> corner_error(const cv::Mat& image, const Camera& 
 TEST(Renderer, CheckerboardCornersAreFoundWhereTheyAreProjected) {
   const Scene board = checkerboard({});
   const Eigen::Vector3d middle(0.16, 0.1, 0);
-  for (const CameraCalibration& calibration : {euroc(), fisheye()}) {
+  for (const CameraCalibration& calibration : {test::radtan_camera(), test::fisheye_camera()}) {
     const Camera camera(calibration);
     const SceneRenderer renderer(board, calibration, {});
     int corners = 0;
@@ -104,11 +86,11 @@ TEST(Renderer, CheckerboardCornersAreFoundWhereTheyAreProjected) {
 
 TEST(Renderer, FeaturesOfARoomAreCornersOfItsPictures) {
   const Scene room = box_room({}, Random(1));
-  const Camera camera(euroc());
+  const Camera camera(test::radtan_camera());
   Eigen::Matrix3d R;  // along x, upright
   R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   const Pose3 pose{Eigen::Quaterniond(R), {-1, 0.3, 1.2}};
-  const ImageMeasurement image = SceneRenderer(room, euroc(), {}).render(pose);
+  const ImageMeasurement image = SceneRenderer(room, test::radtan_camera(), {}).render(pose);
   std::vector<double> errors;
   for (const ScenePoint& point : room.points) {
     const auto error = corner_error(view_of(image), camera, pose, point, 3);
@@ -123,9 +105,9 @@ TEST(Renderer, FeaturesOfARoomAreCornersOfItsPictures) {
 #ifdef LOC_APRILTAG
 TEST(Renderer, AprilTagsAreDetectedWithTheirNumbersAndCorners) {
   const Scene grid = april_grid({.first_tag = 100, .corner_squares = false});
-  const Camera camera(euroc());
+  const Camera camera(test::radtan_camera());
   const Pose3 pose = in_front({0.33, 0.33, 0}, 0.95, {0.25, -0.2, 0.1});
-  const ImageMeasurement image = SceneRenderer(grid, euroc(), {}).render(pose);
+  const ImageMeasurement image = SceneRenderer(grid, test::radtan_camera(), {}).render(pose);
 
   apriltag_family_t* family = tag36h11_create();
   apriltag_detector_t* detector = apriltag_detector_create();
@@ -161,7 +143,7 @@ TEST(Renderer, AprilTagsAreDetectedWithTheirNumbersAndCorners) {
 #endif
 
 ImageMeasurement sample_image(PixelFormat format) {
-  const SceneRenderer renderer(april_grid({}), euroc(), {.format = format});
+  const SceneRenderer renderer(april_grid({}), test::radtan_camera(), {.format = format});
   return renderer.render(in_front({0.33, 0.33, 0}, 0.8, {0.1, 0.2, 0}));
 }
 
