@@ -4,12 +4,16 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 
 #include "libloc/eval/trajectory_error.hpp"
+#include "libloc/io/lcm_log.hpp"
 #include "libloc/io/rig_yaml.hpp"
 #include "libloc/io/tum.hpp"
 #include "libloc/vision/image_codec.hpp"
+#include "msgs/decode.hpp"
 #include "msgs/lcm_log_writer.hpp"
+#include "msgs/slam_messages.hpp"
 #include "program_test.hpp"
 #include "tests/support/rendered_ride.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -49,7 +53,8 @@ class SlamPictures : public ::testing::Test {
       }
       all.emplace_back(image);
       if (i % 10 != 0) continue;
-      ImageMeasurement other = room.at(ride(0), image.time_ns);
+      // Right after the sample that completes the frame.
+      ImageMeasurement other = room.at(ride(0), image.time_ns + from_seconds(0.002));
       other.camera = 1;
       other.sequence = i / 10;
       all.emplace_back(other);
@@ -117,6 +122,14 @@ TEST_F(SlamPictures, LiveIsTheSameWhenNothingIsDropped) {
   }
   ASSERT_EQ(dropped, 0) << errors();
   EXPECT_EQ(read_file(path("live.slam")), read_file(path("offline.slam")));
+  // Each frame once, though pictures of another camera and a damaged one stand between.
+  std::vector<TimeNs> times;
+  LcmLogReader reader(path("live.lcm"));
+  while (const LcmLogEvent* event = reader.next()) {
+    if (event->channel == kSlamFrameChannel) times.push_back(decode_message<slam_frame_t>(event->data).time_ns);
+  }
+  EXPECT_EQ(times.size(), static_cast<std::size_t>(kSeconds / kFrame) - 1);
+  EXPECT_EQ(std::ranges::adjacent_find(times, std::greater_equal<>()), times.end());
 }
 
 TEST_F(SlamPictures, WhatCannotBeIsRefused) {
