@@ -12,9 +12,9 @@
 
 namespace loc {
 
-/// Settings of the filter for tracks of FeatureTracker, where they differ from the general ones: features that stay
-/// inverse depth for longer, and for a camera alone the noise of second
-/// order, since pictures may begin in a turn.
+/// Settings of the filter for tracks of FeatureTracker, where they differ from the general ones: pixels as good as the
+/// tracker says by default (for search ellipses), features that stay inverse depth for longer, and for a camera alone
+/// the noise of second order, since pictures may begin in a turn.
 inline SlamOptions slam_options_for_images(SlamOptions options) {
   options.sigma_px = 1;
   options.map.max_linearity_index = 0.03;
