@@ -46,6 +46,13 @@ enum EstimateStatus : std::uint32_t {
   kFewFeatures = 1U << 17U,           ///< The last frame had too few features that could be used, or none came.
   kFeaturesRejected = 1U << 18U,      ///< Most of the last frame's features are not believed.
   kScaleUnknown = 1U << 19U,          ///< Lengths are in a unit of their own: one camera alone cannot tell metres.
+  kNoImages = 1U << 20U,              ///< No picture, or no tracks of one, for a while: the rest goes on without.
+  kNoImu = 1U << 21U,                 ///< No IMU sample for a while.
+  kNoGps = 1U << 22U,                 ///< No fix yet, or none for a while, where GPS is to tie the world to the Earth.
+  kLost = 1U << 23U,     ///< The camera does not find itself in its map: the pose is a guess, as its covariance says.
+  kRefound = 1U << 24U,  ///< It found itself again, since the last estimate.
+  kCalibrationDoubtful = 1U << 25U,  ///< Pictures disagree with the map in a way that wrong intrinsics explain.
+  kTiltDoubtful = 1U << 26U,         ///< The accelerometers by themselves say another vertical.
 };
 
 /// Error-state order of the covariance: theta, position, velocity, gyroscope bias, accelerometer bias.

@@ -329,6 +329,13 @@ void bind_estimate(py::module_& m) {
       .value("FEW_FEATURES", loc::kFewFeatures)
       .value("FEATURES_REJECTED", loc::kFeaturesRejected)
       .value("SCALE_UNKNOWN", loc::kScaleUnknown)
+      .value("NO_IMAGES", loc::kNoImages)
+      .value("NO_IMU", loc::kNoImu)
+      .value("NO_GPS", loc::kNoGps)
+      .value("LOST", loc::kLost)
+      .value("REFOUND", loc::kRefound)
+      .value("CALIBRATION_DOUBTFUL", loc::kCalibrationDoubtful)
+      .value("TILT_DOUBTFUL", loc::kTiltDoubtful)
       .finalize();
   using loc::Estimate;
   py::class_<Estimate>(m, "Estimate", "What an estimator says after one measurement.")

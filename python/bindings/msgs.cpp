@@ -10,6 +10,7 @@
 
 #include "bindings.hpp"
 #include "loc/clock_t.hpp"
+#include "loc/estimator_status_t.hpp"
 #include "loc/map_points_t.hpp"
 #include "loc/slam_frame_t.hpp"
 #include "loc/slam_state_t.hpp"
@@ -36,12 +37,15 @@ TypeEntry entry() {
           [](std::span<const std::uint8_t> data) { static_cast<void>(loc::decode_message<T>(data)); }};
 }
 
-const std::array<TypeEntry, 15>& types() {
-  static const std::array<TypeEntry, 15> all = {
-      entry<loc::imu_t>(),        entry<loc::magnetometer_t>(),  entry<loc::image_t>(),     entry<loc::gps_fix_t>(),
-      entry<loc::reference_t>(),  entry<loc::estimate_t>(),      entry<loc::tracks_t>(),    entry<loc::map_points_t>(),
-      entry<loc::statistics_t>(), entry<loc::source_status_t>(), entry<loc::clock_t>(),     entry<loc::odometry_t>(),
-      entry<loc::fusion_t>(),     entry<loc::slam_frame_t>(),    entry<loc::slam_state_t>()};
+const std::array<TypeEntry, 16>& types() {
+  static const std::array<TypeEntry, 16> all = {entry<loc::imu_t>(),        entry<loc::magnetometer_t>(),
+                                                entry<loc::image_t>(),      entry<loc::gps_fix_t>(),
+                                                entry<loc::reference_t>(),  entry<loc::estimate_t>(),
+                                                entry<loc::tracks_t>(),     entry<loc::map_points_t>(),
+                                                entry<loc::statistics_t>(), entry<loc::source_status_t>(),
+                                                entry<loc::clock_t>(),      entry<loc::odometry_t>(),
+                                                entry<loc::fusion_t>(),     entry<loc::slam_frame_t>(),
+                                                entry<loc::slam_state_t>(), entry<loc::estimator_status_t>()};
   return all;
 }
 

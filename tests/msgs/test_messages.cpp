@@ -10,6 +10,7 @@
 
 #include "libloc/core/check.hpp"
 #include "libloc/core/random.hpp"
+#include "loc/estimator_status_t.hpp"
 #include "loc/map_points_t.hpp"
 #include "loc/source_status_t.hpp"
 #include "loc/statistics_t.hpp"
@@ -34,6 +35,7 @@ TEST(Messages, FingerprintsAreFrozen) {
   EXPECT_EQ(hash(source_status_t::getHash()), 0xd63ab9362bc56f14U);
   EXPECT_EQ(hash(odometry_t::getHash()), 0x1157247bdae507a3U);
   EXPECT_EQ(hash(fusion_t::getHash()), 0x50f7ee53ce7e222dU);
+  EXPECT_EQ(hash(estimator_status_t::getHash()), 0xfe8191c6f75d653bU);
   EXPECT_EQ(hash(clock_t::getHash()), 0xafbc08ec99f516dbU);
 }
 
