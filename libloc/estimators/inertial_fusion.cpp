@@ -55,10 +55,7 @@ InertialFusionOptions InertialFusionOptions::robust() {
   // A vehicle's engine and road are in it, which a calibration at rest does not see.
   options.filter.noise.gyroscope_noise_density = 5e-4;
   options.filter.noise.accelerometer_noise_density = 1e-2;
-  options.gps_sigma_floor = 1;
-  options.gps_velocity_sigma_floor = 0.1;
-  options.gps_time_sigma = 0.05;
-  options.gps_correlation_time_s = 20;
+  options.make_robust();
   return options;
 }
 
@@ -84,17 +81,7 @@ void InertialFusionOptions::check() const {
   heading_bank.check();
   require(filter.gravity.head<2>().norm() < 1e-9 && filter.gravity.z() < 0, "gravity: world must have z up");
   if (origin) origin->check();
-  require(gps_antenna.allFinite(), "gps_antenna is not finite");
-  require_positive("gps_sigma", gps_sigma);
-  require_positive("gps_differential_part", gps_differential_part);
-  require_positive("gps_float_part", gps_float_part);
-  require_positive("gps_fixed_part", gps_fixed_part);
-  require_positive("gps_vertical_factor", gps_vertical_factor);
-  require_positive("gps_velocity_sigma", gps_velocity_sigma);
-  require_not_negative("gps_sigma_floor", gps_sigma_floor);
-  require_not_negative("gps_velocity_sigma_floor", gps_velocity_sigma_floor);
-  require_not_negative("gps_correlation_time_s", gps_correlation_time_s);
-  require_not_negative("gps_time_sigma", gps_time_sigma);
+  check_gps();
   require_positive("gps_max_ahead_s", gps_max_ahead_s);
   require_positive("odometry_position_sigma", odometry_position_sigma);
   require_positive("odometry_orientation_sigma", odometry_orientation_sigma);

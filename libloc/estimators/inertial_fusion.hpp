@@ -31,6 +31,7 @@
 #include "libloc/estimators/estimate.hpp"
 #include "libloc/estimators/estimator.hpp"
 #include "libloc/estimators/fusion_start.hpp"
+#include "libloc/estimators/gps_position.hpp"
 #include "libloc/estimators/heading_bank.hpp"
 #include "libloc/estimators/stand_still.hpp"
 #include "libloc/geometry/geodesy.hpp"
@@ -52,7 +53,7 @@ struct GivenStart {
   Eigen::MatrixXd covariance;  ///< of the filter's whole error state
 };
 
-struct InertialFusionOptions {
+struct InertialFusionOptions : GpsErrorModel {
   ErrorStateOptions filter;
   FusionStartOptions start;
   StandStillOptions stand_still;
@@ -63,23 +64,6 @@ struct InertialFusionOptions {
 
   bool use_gps = true;
   bool use_gps_velocity = true;
-  Eigen::Vector3d gps_antenna = Eigen::Vector3d::Zero();  ///< lever arm in body axes [m]
-  /// Deviations of a fix that does not say: horizontal of a stand-alone fix, and parts of it for better ones and up.
-  double gps_sigma = 5;                ///< [m]
-  double gps_differential_part = 0.3;  ///< of gps_sigma
-  double gps_float_part = 0.1;         ///< of gps_sigma
-  double gps_fixed_part = 0.006;       ///< of gps_sigma
-  double gps_vertical_factor = 2;      ///< up against horizontal
-  double gps_velocity_sigma = 0.3;     ///< [m/s]
-  /// A receiver's covariance says how much fixes scatter. What they have in common for minutes (atmosphere, multipath)
-  /// and an error of their time stamps is not in it: deviations are at least these (RTK: as stated), and the way that
-  /// the body goes in the time is added.
-  double gps_sigma_floor = 0;           ///< horizontal, vertical by gps_vertical_factor [m]
-  double gps_velocity_sigma_floor = 0;  ///< [m/s]
-  double gps_time_sigma = 0;            ///< [s]
-  /// How long the error of a position lasts, with a fix below RTK. Fixes dt apart count as white ones of (1 + phi)/(1 -
-  /// phi) times the variance, phi = exp(-dt/this): as little as they tell together. 0: white. [s]
-  double gps_correlation_time_s = 0;
   double gps_max_ahead_s = 1;  ///< A fix that is further ahead of the IMU belongs to another clock. [s]
 
   bool use_odometry = true;
@@ -168,8 +152,8 @@ class InertialFusion {
 
   void process_other(const Measurement& measurement);
   void fuse(const GpsMeasurement& gps);
-  bool prepare(const GpsMeasurement& gps, Eigen::Vector3d& position, Eigen::Matrix3d& position_cov,
-               Eigen::Vector3d& velocity, Eigen::Matrix3d& velocity_cov);
+  bool refused(GpsRefusal refusal);
+  bool prepare(const GpsMeasurement& gps, GpsPosition& fix);
   void anchor(TimeNs time_ns, const Eigen::Vector3d& position, const Eigen::Matrix3d& position_cov);
   void fuse(const OdometryMeasurement& odometry);
   void look_for_motion(const OdometryMeasurement& odometry, const Eigen::Matrix3d& position_cov);

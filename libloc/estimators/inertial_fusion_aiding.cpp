@@ -1,8 +1,6 @@
 // GPS and odometry in InertialFusion, and what is done when they are rejected.
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "libloc/estimators/inertial_fusion.hpp"
 #include "libloc/geometry/so3.hpp"
@@ -10,11 +8,10 @@
 namespace loc {
 namespace {
 
-constexpr int kToldAfter = 3;  // rejections in a row
-// So little is known of what is not measured that nothing follows from it, however often it is said. [m^2], [rad^2]
+constexpr int kToldAfter = 3;     // rejections in a row
 constexpr int kFixesToDoubt = 3;  // rejections of GPS in a row
+// So little is known of what is not measured that nothing follows from it, however often it is said. [m^2], [rad^2]
 constexpr double kNothing = 1e8;
-constexpr double kMostVariance = 1e14;
 constexpr double kOldestAnchor = 1;        // [s]
 constexpr double kApartToSeeMotion = 0.5;  // between two poses [s]
 constexpr double kSeesMotion = 5;          // deviations
@@ -23,20 +20,6 @@ constexpr double kAttitudeDoubt = 0.1;     // [rad]
 
 double square(double x) {
   return x * x;
-}
-
-// Adds what the horizontal (and vertical) variances lack.
-// Symmetric, positive definite, and small enough to reckon with.
-bool usable(const Eigen::Matrix3d& cov) {
-  return cov.allFinite() && cov.cwiseAbs().maxCoeff() < kMostVariance &&
-         (cov - cov.transpose()).isZero(1e-6 * cov.norm()) && cov.diagonal().minCoeff() > 0 &&
-         cov.llt().info() == Eigen::Success;
-}
-
-void raise(Eigen::Matrix3d& cov, double sigma_floor, double vertical_factor) {
-  const double horizontal = square(sigma_floor) - 0.5 * (cov(0, 0) + cov(1, 1));
-  const double vertical = square(sigma_floor * vertical_factor) - cov(2, 2);
-  cov.diagonal() += Eigen::Vector3d(horizontal, horizontal, vertical).cwiseMax(0);
 }
 
 }  // namespace
@@ -49,110 +32,85 @@ void InertialFusion::process_other(const Measurement& measurement) {
   }
 }
 
-bool InertialFusion::prepare(const GpsMeasurement& gps, Eigen::Vector3d& position, Eigen::Matrix3d& position_cov,
-                             Eigen::Vector3d& velocity, Eigen::Matrix3d& velocity_cov) {
-  if (gps.fix < GpsFixType::k2d) {
-    ++counts_["gps.skipped.no_fix"];
-    return false;
+bool InertialFusion::refused(GpsRefusal refusal) {
+  switch (refusal) {
+    case GpsRefusal::kNone:
+      return false;
+    case GpsRefusal::kNoFix:
+      ++counts_["gps.skipped.no_fix"];
+      return true;
+    case GpsRefusal::kNotFinite:
+      skip("gps.skipped.not_finite", kNotFinite);
+      return true;
+    case GpsRefusal::kOutOfRange:
+      skip("gps.skipped.out_of_range", kOutOfRange);
+      return true;
+    case GpsRefusal::kBadCovariance:
+      skip("gps.bad_covariance", kBadCovariance);
+      return true;
+    case GpsRefusal::kRepeated:
+      ++counts_["gps.skipped.repeated"];
+      return true;
   }
-  if (!std::isfinite(gps.latitude) || !std::isfinite(gps.longitude)) {
-    skip("gps.skipped.not_finite", kNotFinite);
-    return false;
-  }
-  if (std::abs(gps.latitude) > std::numbers::pi / 2) {
-    skip("gps.skipped.out_of_range", kOutOfRange);
-    return false;
-  }
+  return true;
+}
+
+bool InertialFusion::prepare(const GpsMeasurement& gps, GpsPosition& fix) {
+  GeodeticPoint place;
+  if (refused(gps_place(gps, place))) return false;
   TimeNs ahead = 0;
   if (gps.time_ns == kNoTime || __builtin_sub_overflow(gps.time_ns, filter().time_ns(), &ahead) ||
       to_seconds(ahead) > options_.gps_max_ahead_s) {
     skip("gps.skipped.ahead", kOutOfRange);
     return false;
   }
-  const bool has_height = std::isfinite(gps.altitude);
-  const GeodeticPoint place{gps.latitude, gps.longitude, has_height ? gps.altitude : 0};
+  const InertialState& x = filter().state().inertial;
   if (!world_) {
     world_.emplace(place);
     if (options_.given_start) {
       // Nobody said where on the Earth the given start is; this fix does.
-      const InertialState& x = filter().state().inertial;
       world_.emplace(LocalFrame(place).to_geodetic(-(x.position + x.q_world_body * options_.gps_antenna)));
       anchored_ = tied_ = true;
     }
   }
-  position = world_->to_local(place);
-  const Eigen::Matrix3d turn = world_->R_local_enu(place);
-  position_cov = gps.position_cov;
-  if (position_cov.hasNaN()) {
-    double sigma = options_.gps_sigma;
-    if (gps.fix == GpsFixType::kDifferential) sigma *= options_.gps_differential_part;
-    if (gps.fix == GpsFixType::kFloat) sigma *= options_.gps_float_part;
-    if (gps.fix == GpsFixType::kFixed) sigma *= options_.gps_fixed_part;
-    position_cov =
-        Eigen::Vector3d(square(sigma), square(sigma), square(sigma * options_.gps_vertical_factor)).asDiagonal();
-  }
   // The first fix becomes the state, so that the filter cannot judge it.
-  if (!usable(position_cov)) {
-    skip("gps.bad_covariance", kBadCovariance);
-    return false;
-  }
-  position_cov = (turn * position_cov * turn.transpose()).eval();
-  raise(position_cov, gps.fix < GpsFixType::kFloat ? options_.gps_sigma_floor : 0, options_.gps_vertical_factor);
-  // The fix that the state begins with says all that one can say.
-  if (options_.gps_correlation_time_s > 0 && gps.fix < GpsFixType::kFloat && gps_before_ns_ != kNoTime) {
-    const double apart = std::abs(to_seconds(gps.time_ns - gps_before_ns_));
-    if (apart == 0) {
-      ++counts_["gps.skipped.repeated"];
-      return false;
-    }
-    const double phi = std::exp(-apart / options_.gps_correlation_time_s);
-    position_cov *= (1 + phi) / (1 - phi);
-  }
-  const Eigen::Vector3d way = options_.gps_time_sigma * filter().state().inertial.velocity;
+  if (refused(gps_in_world(gps, options_, *world_, gps_before_ns_, fix))) return false;
+  const Eigen::Vector3d way = options_.gps_time_sigma * x.velocity;
   if (heading_known_) {
-    position_cov += way * way.transpose();
+    fix.position_cov += way * way.transpose();
   } else {
-    position_cov += way.squaredNorm() * Eigen::Matrix3d::Identity();
+    fix.position_cov += way.squaredNorm() * Eigen::Matrix3d::Identity();
   }
-  if (!has_height || gps.fix == GpsFixType::k2d) {
-    position.z() = filter().state().inertial.position.z();
-    position_cov.row(2).setZero();
-    position_cov.col(2).setZero();
-    position_cov(2, 2) = kNothing;
+  if (!fix.has_height) {
+    fix.position.z() = x.position.z();
+    fix.position_cov.row(2).setZero();
+    fix.position_cov.col(2).setZero();
+    fix.position_cov(2, 2) = kNothing;
   }
-  velocity.setConstant(kUnknown);
-  if (options_.use_gps_velocity && gps.velocity_enu.allFinite()) {
-    velocity = turn * gps.velocity_enu;
-    velocity_cov = gps.velocity_cov.hasNaN()
-                       ? Eigen::Matrix3d(square(options_.gps_velocity_sigma) * Eigen::Matrix3d::Identity())
-                       : Eigen::Matrix3d(turn * gps.velocity_cov * turn.transpose());
-    raise(velocity_cov, options_.gps_velocity_sigma_floor, 1);
-  }
+  if (!options_.use_gps_velocity) fix.velocity.setConstant(kUnknown);
   return true;
 }
 
 void InertialFusion::fuse(const GpsMeasurement& gps) {
-  Eigen::Vector3d position;
-  Eigen::Matrix3d position_cov;
-  Eigen::Vector3d velocity;
-  Eigen::Matrix3d velocity_cov = Eigen::Matrix3d::Constant(kUnknown);
-  if (!prepare(gps, position, position_cov, velocity, velocity_cov)) return;
-  rest_.confirm_speed(velocity.norm(), std::sqrt(velocity_cov.diagonal().maxCoeff()));
+  GpsPosition fix;
+  if (!prepare(gps, fix)) return;
+  rest_.confirm_speed(fix.velocity.norm(), std::sqrt(fix.velocity_cov.diagonal().maxCoeff()));
   if (!anchored_) {
     if (std::abs(to_seconds(filter().time_ns() - gps.time_ns)) > kOldestAnchor) {
       skip("gps.too_late", kTooLate);
       return;
     }
-    anchor(gps.time_ns, position, position_cov);
-    position.setConstant(kUnknown);  // it is in the state now
-    if (!velocity.allFinite()) return;
+    anchor(gps.time_ns, fix.position, fix.position_cov);
+    fix.position.setConstant(kUnknown);  // it is in the state now
+    if (!fix.velocity.allFinite()) return;
   } else if (!heading_known_ && bank_.size() == 1) {
     const ErrorStateState state = filter().state();
     bank_.start_all_headings(filter().time_ns(), state, Eigen::MatrixXd(filter().covariance()));
   }
   gps_before_ns_ = std::max(gps_before_ns_, gps.time_ns);
   take_note(bank_.fuse([&](ErrorStateFilter& one) {
-    return one.fuse_gps(gps.time_ns, position, position_cov, options_.gps_antenna, velocity, velocity_cov);
+    return one.fuse_gps(gps.time_ns, fix.position, fix.position_cov, options_.gps_antenna, fix.velocity,
+                        fix.velocity_cov);
   }));
 }
 
@@ -205,7 +163,7 @@ void InertialFusion::fuse(const OdometryMeasurement& odometry) {
       chosen(options_.odometry_position_cov, odometry.position_cov, options_.odometry_position_sigma);
   const Eigen::Matrix3d orientation_cov =
       chosen(options_.odometry_orientation_cov, odometry.orientation_cov, options_.odometry_orientation_sigma);
-  if (!usable(position_cov) || !usable(orientation_cov)) {
+  if (!is_usable_covariance(position_cov) || !is_usable_covariance(orientation_cov)) {
     skip("odometry.bad_covariance", kBadCovariance);
     return;
   }
