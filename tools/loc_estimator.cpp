@@ -13,6 +13,7 @@
 #include "tools/support/child_process.hpp"
 #include "tools/support/estimate_output.hpp"
 #include "tools/support/fusion_options.hpp"
+#include "tools/support/held_back_output.hpp"
 #include "tools/support/live_estimator.hpp"
 #include "tools/support/log.hpp"
 #include "tools/support/open_source.hpp"
@@ -110,6 +111,8 @@ loc::EstimatorSettings settings_of(const Arguments& arguments, const loc::Rig& r
     if (arguments.slam.images) usual = options_for_images(usual);
     settings.slam = loc::slam_options(arguments.slam, arguments.method, rig, usual);
     settings.slam_start = loc::slam_start(arguments.slam, settings.slam);
+    const bool inertial = settings.slam.motion == loc::SlamMotion::kInertial;
+    if (!arguments.fusion.no_gps) settings.anchor = loc::anchor_options(arguments.fusion, inertial, rig);
     return settings;
   }
   settings.fusion = loc::fusion_options(arguments.fusion, arguments.preset, rig);
@@ -120,17 +123,23 @@ loc::EstimatorSettings settings_of(const Arguments& arguments, const loc::Rig& r
   return settings;
 }
 
+constexpr std::size_t kMostHeldBack = 30'000;  // estimates until GPS says where they are: two minutes and some
+
 int run_offline(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimator estimator) {
   const loc::SourceSpec input = input_of(arguments, rig);
   loc::refuse_to_overwrite(input.path, arguments.output);
   const auto source = open(input);
-  const auto output = loc::open_estimate_output(arguments.output, estimator.method(), estimator.world(), arguments.geo);
+  auto output = loc::open_estimate_output(arguments.output, estimator.method(), estimator.world(), arguments.geo);
   std::int64_t estimates = 0;
   loc::EstimatorPipeline pipeline(std::move(estimator), rig, arguments.live.merger, [&](const loc::Estimate& estimate) {
     ++estimates;
     output->write(estimate);
   });
   loc::Stamp last_frame;
+  if (pipeline.estimator().anchor() != nullptr) {
+    output = std::make_unique<loc::HeldBackOutput>(
+        std::move(output), [&] { return pipeline.estimator().anchor(); }, kMostHeldBack);
+  }
   pipeline.set_frame_sink([&](const loc::SlamFrame& frame) {
     output->write_frame(frame);
     last_frame = frame;
@@ -140,9 +149,9 @@ int run_offline(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimat
     pipeline.push(std::move(*measurement));
   }
   pipeline.end();
-  if (const loc::SlamFilter* slam = pipeline.estimator().slam()) output->write_map(last_frame, slam->map());
+  if (pipeline.estimator().slam() != nullptr) output->write_map(last_frame, pipeline.estimator().slam_map());
   output->finish();
-  const bool map_written = loc::write_map(arguments.slam, pipeline.estimator().slam());
+  const bool map_written = loc::write_map(arguments.slam, pipeline.estimator().slam(), pipeline.estimator().anchor());
   loc::log_info("event=ended interrupted={} estimates={} output=\"{}\" source=\"{}\" {} {}", loc::stop_requested(),
                 estimates, arguments.output, input.path, loc::format_counts(source->counts()),
                 loc::format_counts(pipeline.counts()));
@@ -170,7 +179,8 @@ int run_live(const Arguments& arguments, const loc::Rig& rig, loc::AnyEstimator 
     loc::log_warning("event=implausible_unit reason=\"{}\"", doubt);
   }
   loc::log_info("event=ended {} {}", loc::format_counts(live.counts()), loc::format_latency("latency", live.latency()));
-  return loc::write_map(arguments.slam, live.estimator().slam()) ? loc::kExitOk : loc::kExitFailed;
+  return loc::write_map(arguments.slam, live.estimator().slam(), live.estimator().anchor()) ? loc::kExitOk
+                                                                                            : loc::kExitFailed;
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <utility>
 
 #include "libloc/core/check.hpp"
@@ -34,12 +35,28 @@ AnyEstimator make_error_state(const EstimatorSettings& settings) {
 const std::vector<StreamKind> kSlamInputs = {StreamKind::kImu, StreamKind::kFeatures};
 
 AnyEstimator make_mono_slam(const EstimatorSettings& settings) {
-  return {"mono-slam", world_frame_name(WorldFrame::kEnu), kSlamInputs, MonoSlam(settings.slam), settings.slam_start};
+  AnyEstimator out("mono-slam", world_frame_name(WorldFrame::kEnu), kSlamInputs, MonoSlam(settings.slam),
+                   settings.slam_start);
+  if (settings.anchor) out.set_anchor(*settings.anchor);
+  return out;
 }
 
 AnyEstimator make_inertial_slam(const EstimatorSettings& settings) {
-  return {"inertial-slam", world_frame_name(WorldFrame::kEnu), kSlamInputs, InertialSlam(settings.slam),
-          settings.slam_start};
+  AnyEstimator out("inertial-slam", world_frame_name(WorldFrame::kEnu), kSlamInputs, InertialSlam(settings.slam),
+                   settings.slam_start);
+  if (settings.anchor) out.set_anchor(*settings.anchor);
+  out.set_attitude_check(settings.use_magnetometer && settings.anchor.has_value());
+  return out;
+}
+
+// What each method cannot do without.
+StreamWatchOptions watch_options(const AnyEstimator::Implementation& implementation) {
+  StreamWatchOptions options;
+  if (!std::holds_alternative<MonoSlam>(implementation)) options.needed.push_back(StreamKind::kImu);
+  if (std::holds_alternative<MonoSlam>(implementation) || std::holds_alternative<InertialSlam>(implementation)) {
+    options.needed.push_back(StreamKind::kImage);
+  }
+  return options;
 }
 
 constexpr std::array kMethods = {Method{"madgwick", make_madgwick}, Method{"error-state", make_error_state},
@@ -66,7 +83,8 @@ AnyEstimator::AnyEstimator(std::string method, std::string world, std::vector<St
       world_(std::move(world)),
       inputs_(std::move(inputs)),
       implementation_(std::move(implementation)),
-      start_(std::move(start)) {
+      start_(std::move(start)),
+      watch_(watch_options(implementation_)) {
   restore();
 }
 
@@ -95,7 +113,20 @@ void AnyEstimator::set_front_end(std::unique_ptr<PictureFrontEnd> front_end) {
   require(!start_ && options.landmarks.empty(),
           "pictures: features of a saved map or known landmarks are not recognised");
   front_end_ = std::move(front_end);
-  inputs_ = {StreamKind::kImu, StreamKind::kImage};
+  std::replace(inputs_.begin(), inputs_.end(), StreamKind::kFeatures, StreamKind::kImage);
+}
+
+void AnyEstimator::set_anchor(const MapAnchorOptions& options) {
+  require(std::holds_alternative<MonoSlam>(implementation_) || std::holds_alternative<InertialSlam>(implementation_),
+          "method '" + method_ + "' has no map to anchor");
+  anchor_.emplace(options);
+  if (!takes(StreamKind::kGps)) inputs_.push_back(StreamKind::kGps);
+}
+
+void AnyEstimator::set_attitude_check(bool use_magnetometer) {
+  require(std::holds_alternative<InertialSlam>(implementation_), "method '" + method_ + "' has no attitude to check");
+  attitude_.emplace();
+  if (use_magnetometer && !takes(StreamKind::kMagnetometer)) inputs_.push_back(StreamKind::kMagnetometer);
 }
 
 template <class Slam>
@@ -114,22 +145,30 @@ bool AnyEstimator::process_with_pictures(Slam& slam, const Measurement& measurem
   }
   gave_estimate_ = is_new;
   frames_are_new_ = true;
-  for (const SlamFrame& frame : slam_frames()) front_end_->learn(frame);
+  for (const SlamFrame& frame : raw_frames()) front_end_->learn(frame);
   return is_new;
+}
+
+bool AnyEstimator::pass_to_method(const Measurement& measurement) {
+  auto* mono = std::get_if<MonoSlam>(&implementation_);
+  auto* inertial = std::get_if<InertialSlam>(&implementation_);
+  if (front_end_ != nullptr && mono != nullptr) return process_with_pictures(*mono, measurement);
+  if (front_end_ != nullptr && inertial != nullptr) return process_with_pictures(*inertial, measurement);
+  frames_are_new_ = true;
+  return std::visit([&](auto& estimator) { return estimator.process(measurement); }, implementation_);
 }
 
 bool AnyEstimator::process(const Measurement& measurement) {
   gave_estimate_ = frames_are_new_ = false;
-  auto* mono = std::get_if<MonoSlam>(&implementation_);
-  auto* inertial = std::get_if<InertialSlam>(&implementation_);
-  if (front_end_ != nullptr && mono != nullptr) {
-    gave_estimate_ = process_with_pictures(*mono, measurement);
-  } else if (front_end_ != nullptr && inertial != nullptr) {
-    gave_estimate_ = process_with_pictures(*inertial, measurement);
-  } else {
-    gave_estimate_ = std::visit([&](auto& estimator) { return estimator.process(measurement); }, implementation_);
-    frames_are_new_ = true;
+  frame_count_ = 0;
+  watch_.see(measurement);
+  if (const auto* gps = std::get_if<GpsMeasurement>(&measurement); gps != nullptr && anchor_) {
+    anchor_->fuse(*gps);
+    return false;
   }
+  if (attitude_) attitude_->see(measurement);
+  gave_estimate_ = pass_to_method(measurement);
+  take_result();
   return gave_estimate_;
 }
 
@@ -138,11 +177,53 @@ bool AnyEstimator::finish() {
   auto* inertial = std::get_if<InertialSlam>(&implementation_);
   frames_are_new_ = inertial != nullptr;
   if (inertial != nullptr) gave_estimate_ = inertial->finish();
+  take_result();
   return gave_estimate_;
 }
 
+// The method's estimate, in the world that GPS gives it, with what else is known of it.
+void AnyEstimator::take_result() {
+  if (gave_estimate_) {
+    const Estimate made = std::visit([](const auto& estimator) { return estimator.estimate(); }, implementation_);
+    std::uint32_t status = watch_.status();
+    if (attitude_) status |= attitude_->compare(made);
+    if (anchor_) {
+      if (attitude_ && !anchor_->anchored()) {
+        if (const auto heading = attitude_->heading_of_world(made)) {
+          anchor_->hint_heading(*heading, attitude_->options().heading_sigma);
+        }
+      }
+      Estimate in_map = made;
+      in_map.status |= status;
+      anchor_->move(in_map);
+      estimate_ = anchor_->in_world(in_map);
+      estimate_.status |= anchor_->take_status();
+    } else {
+      estimate_ = made;
+      estimate_.status |= status;
+    }
+    georeferenced_ = std::isfinite(estimate_.origin.latitude);
+  }
+  give_frames();
+}
+
+void AnyEstimator::give_frames() {
+  for (const SlamFrame& frame : raw_frames()) {
+    if (frames_.size() == frame_count_) frames_.emplace_back();
+    SlamFrame& out = frames_[frame_count_++];
+    out = frame;
+    if (anchor_) anchor_->put_in_world(out);
+  }
+}
+
 Estimate AnyEstimator::estimate() const {
-  return std::visit([](const auto& estimator) { return estimator.estimate(); }, implementation_);
+  return estimate_;
+}
+
+std::uint32_t AnyEstimator::status() const {
+  constexpr std::uint32_t kOfStreams = kNoImages | kNoImu;
+  // Of streams the newest measurement tells, of the rest the last estimate.
+  return (estimate_.status & ~kOfStreams) | watch_.status();
 }
 
 NamedCounts AnyEstimator::counts() const {
@@ -150,17 +231,27 @@ NamedCounts AnyEstimator::counts() const {
   if (front_end_ != nullptr) {
     for (NamedCount& count : front_end_->counts()) out.push_back(std::move(count));
   }
+  if (anchor_) {
+    for (NamedCount& count : anchor_->counts()) out.push_back(std::move(count));
+  }
   return out;
 }
 
 void AnyEstimator::reset() {
   std::visit([](auto& estimator) { estimator.reset(); }, implementation_);
-  gave_estimate_ = frames_are_new_ = false;
+  gave_estimate_ = frames_are_new_ = georeferenced_ = false;
+  frame_count_ = 0;
+  estimate_.time_ns = kNoTime;
+  estimate_.valid = estimate_.status = 0;
+  estimate_.covariance_dim = 0;
+  watch_.reset();
+  if (anchor_) anchor_->reset();
+  if (attitude_) attitude_->reset();
   if (front_end_ != nullptr) front_end_->reset();
   restore();
 }
 
-std::span<const SlamFrame> AnyEstimator::slam_frames() const {
+std::span<const SlamFrame> AnyEstimator::raw_frames() const {
   if (!frames_are_new_) return {};
   if (const auto* inertial = std::get_if<InertialSlam>(&implementation_)) return inertial->frames();
   const auto* mono = std::get_if<MonoSlam>(&implementation_);
@@ -170,7 +261,12 @@ std::span<const SlamFrame> AnyEstimator::slam_frames() const {
 
 std::vector<SlamMapPoint> AnyEstimator::slam_map() const {
   const SlamFilter* filter = slam();
-  return filter != nullptr ? filter->map() : std::vector<SlamMapPoint>{};
+  if (filter == nullptr) return {};
+  std::vector<SlamMapPoint> points = filter->map();
+  if (anchor_) {
+    for (SlamMapPoint& point : points) anchor_->put_in_world(point);
+  }
+  return points;
 }
 
 const SlamFilter* AnyEstimator::slam() const {

@@ -37,7 +37,7 @@ GeodeticPoint parse_origin(const std::string& text) {
 }  // namespace
 
 void add_fusion_options(CLI::App& app, FusionArguments& arguments) {
-  app.add_flag("--no-gps", arguments.no_gps, "error-state: leave GPS aside");
+  app.add_flag("--no-gps", arguments.no_gps, "error-state, SLAM: leave GPS aside");
   app.add_flag("--no-odometry", arguments.no_odometry, "error-state: leave odometry aside");
   app.add_flag("--no-zero-velocity", arguments.no_zero_velocity, "error-state: take no use of rest");
   arguments.odometry_option =
@@ -54,10 +54,11 @@ void add_fusion_options(CLI::App& app, FusionArguments& arguments) {
   app.add_option("--declination", arguments.declination_deg, "error-state: magnetic declination, east positive [deg]")
       ->capture_default_str();
   arguments.gps_sigma_option = app.add_option("--gps-sigma", arguments.gps_sigma,
-                                              "error-state: horizontal deviation of a fix that states none [m]")
+                                              "error-state, SLAM: horizontal deviation of a fix that states none [m]")
                                    ->check(CLI::PositiveNumber);
-  app.add_option("--origin", arguments.origin,
-                 "error-state: LATITUDE,LONGITUDE,ALTITUDE of world's origin [deg, deg, m]; otherwise the first fix");
+  app.add_option(
+      "--origin", arguments.origin,
+      "error-state, SLAM: LATITUDE,LONGITUDE,ALTITUDE of world's origin [deg, deg, m]; otherwise the first fix");
 }
 
 InertialFusionOptions fusion_options(const FusionArguments& arguments, const std::string& preset, const Rig& rig) {
@@ -77,6 +78,18 @@ InertialFusionOptions fusion_options(const FusionArguments& arguments, const std
   }
   // Guesses in the rig are no better than the preset's.
   if (rig.imu && !rig.imu->noise_measured.empty() && preset == "robust") options.filter.noise = rig.imu->noise;
+  options.check();
+  return options;
+}
+
+MapAnchorOptions anchor_options(const FusionArguments& arguments, bool inertial, const Rig& rig) {
+  MapAnchorOptions options = MapAnchorOptions::robust(inertial);
+  if (arguments.gps_sigma_option->count() > 0) options.gps_sigma = arguments.gps_sigma;
+  if (!arguments.origin.empty()) options.origin = parse_origin(arguments.origin);
+  if (rig.gps) {
+    options.gps_antenna = rig.gps->antenna_in_body;
+    if (std::isfinite(rig.gps->time_offset_sigma_s)) options.gps_time_sigma = rig.gps->time_offset_sigma_s;
+  }
   options.check();
   return options;
 }

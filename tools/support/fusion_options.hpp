@@ -1,9 +1,10 @@
-// The options of --method error-state.
+// The options of --method error-state, and of GPS for SLAM.
 #pragma once
 
 #include <string>
 
 #include "libloc/estimators/inertial_fusion.hpp"
+#include "libloc/estimators/map_anchor.hpp"
 #include "libloc/io/source.hpp"
 #include "libloc/sensors/rig.hpp"
 #include "tools/support/cli_forward.hpp"
@@ -32,6 +33,9 @@ void add_fusion_options(CLI::App& app, FusionArguments& arguments);
 /// for the preset robust, the noise of the IMU where it was measured
 /// @throws UsageError, std::invalid_argument naming the option.
 InertialFusionOptions fusion_options(const FusionArguments& arguments, const std::string& preset, const Rig& rig);
+
+/// How GPS ties the map of SLAM to the Earth. @throws as fusion_options.
+MapAnchorOptions anchor_options(const FusionArguments& arguments, bool inertial, const Rig& rig);
 
 /// Start where the reference of a recording says: for evaluation of what comes after the start. The reference nearest
 /// to the first IMU sample is used; its deviations are the preset's (robust: those of the preset 19).

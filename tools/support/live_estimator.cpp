@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "libloc/core/check.hpp"
+#include "loc/estimator_status_t.hpp"
 #include "loc/source_status_t.hpp"
 #include "msgs/convert.hpp"
 #include "msgs/slam_messages.hpp"
@@ -20,6 +21,7 @@ constexpr TimeNs kSecond = 1'000'000'000;
 constexpr TimeNs kAnswerEvery = 5'000'000;  // a flood of questions must not become a flood of answers
 constexpr TimeNs kPoll = 50'000'000;
 constexpr TimeNs kDrainLimit = kSecond;
+constexpr TimeNs kSilence = 2 * kSecond;
 constexpr int kReceivePollMs = 50;
 constexpr int kRefusalsLogged = 10;
 
@@ -99,12 +101,14 @@ LiveEstimator::LiveEstimator(LiveEstimatorOptions options, AnyEstimator estimato
 
 void LiveEstimator::run() {
   next_report_ns_ = steady_now() + kSecond;
+  heard_ns_ = steady_now();
   std::thread receiving([this] { receive(); });
   // The thread must be joined whatever happens.
   try {
     RawMessage message;
     while (!stop_requested() && !(source_ended_ && options_.exit_at_end)) {
       if (queues_.pop(message, kPoll)) handle(message);
+      publish_status();
       report_each_second();
     }
     stop_receiving_ = true;
@@ -154,6 +158,7 @@ void LiveEstimator::handle_measurement(const RawMessage& message) {
       return;
     }
     source_ended_ = false;
+    heard_ns_ = steady_now();
     pipeline_.push(std::move(*measurement));
   } catch (const DataError& error) {
     refuse(message.input, error.what());
@@ -205,6 +210,32 @@ void LiveEstimator::publish_statistics() {
   statistics_t message = statistics_message(kEstimatorProgram, counts());
   add_latency(message, "latency", latency_);
   publisher_.publish(kStatisticsChannel, message);
+}
+
+// When something changes, and each second.
+void LiveEstimator::publish_status() {
+  const TimeNs now = steady_now();
+  Conditions& conditions = pipeline_.conditions();
+  // After the end of a recording silence is right.
+  conditions.set_silent(!source_ended_ && now - heard_ns_ > kSilence);
+  if (!conditions.take_change() && now < next_status_ns_) return;
+  next_status_ns_ = now + kSecond;
+  estimator_status_t message{};
+  message.time_ns = host_now();
+  message.measurement_time_ns = conditions.now_ns();
+  message.method = pipeline_.estimator().method();
+  message.status = static_cast<std::int32_t>(conditions.status());
+  message.georeferenced = pipeline_.estimator().georeferenced() ? 1 : 0;
+  for (const Conditions::Held& held : conditions.held()) {
+    message.condition.emplace_back(held.condition.name);
+    message.since_s.push_back(to_seconds(conditions.now_ns() - held.since_ns));
+  }
+  if (conditions.silent()) {
+    message.condition.emplace_back("no measurements");
+    message.since_s.push_back(to_seconds(now - heard_ns_));
+  }
+  message.size = static_cast<std::int32_t>(message.condition.size());
+  publisher_.publish(options_.status_channel, message);
 }
 
 void LiveEstimator::report_each_second() {

@@ -22,6 +22,7 @@ struct LiveEstimatorOptions {
   std::array<std::string, kStreamKinds> channels;  ///< empty: default_channel()
   std::string estimate_channel = "LOC_ESTIMATE";
   std::string fusion_channel = "LOC_FUSION";
+  std::string status_channel = "LOC_ESTIMATOR_STATUS";
   TimeNs map_period_ns = 1'000'000'000;  ///< of SLAM's map on LOC_MAP, in measurement time
   StreamMergerOptions merger;
   std::size_t queue_capacity = 16384;  ///< messages of each stream but images
@@ -54,6 +55,7 @@ class LiveEstimator {
   void publish_estimate(const Estimate& estimate);
   void publish_frame(const SlamFrame& frame);
   void publish_statistics();
+  void publish_status();
   void report_each_second();
   void refuse(std::size_t input, const std::string& reason);
 
@@ -72,6 +74,8 @@ class LiveEstimator {
   TimeNs last_map_ns_ = kNoTime;
   TimeNs next_report_ns_ = 0;
   TimeNs next_answer_ns_ = 0;
+  TimeNs next_status_ns_ = 0;
+  TimeNs heard_ns_ = 0;  // the last measurement
 };
 
 }  // namespace loc

@@ -68,6 +68,10 @@ void EstimatorPipeline::push(Measurement measurement) {
   const std::int64_t resets = merger_.counts().resets;
   measurement = calibrated(rig_, std::move(measurement));
   units_.see(measurement);
+  if (estimator_.takes_at_once(kind_of(measurement))) {
+    process(measurement);
+    return;
+  }
   if (estimator_.takes_late(kind_of(measurement)) && merger_.has_passed(stamp_of(measurement).time_ns)) {
     ++passed_late_[measurement.index()];
     process(measurement);
@@ -95,6 +99,7 @@ void EstimatorPipeline::drain() {
 
 void EstimatorPipeline::process(const Measurement& measurement) {
   pass_on(estimator_.process(measurement));
+  conditions_.update(estimator_.newest_measurement_ns(), estimator_.status());
 }
 
 void EstimatorPipeline::pass_on(bool is_new) {
@@ -125,6 +130,7 @@ NamedCounts EstimatorPipeline::counts() const {
   out.push_back({"clock.resets", merger.resets});
   out.push_back({"merger.forced", merger.forced});
   for (NamedCount& count : estimator_.counts()) out.push_back(std::move(count));
+  for (NamedCount& count : conditions_.counts()) out.push_back(std::move(count));
   out.push_back({"estimates", estimates_});
   return out;
 }

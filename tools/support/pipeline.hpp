@@ -14,6 +14,7 @@
 #include "libloc/sensors/rig.hpp"
 #include "libloc/sensors/stream.hpp"
 #include "tools/support/any_estimator.hpp"
+#include "tools/support/conditions.hpp"
 #include "tools/support/unit_check.hpp"
 
 namespace loc {
@@ -57,6 +58,10 @@ class EstimatorPipeline {
   const AnyEstimator& estimator() const { return estimator_; }
   const SequenceCheck& sequences() const { return sequences_; }
   std::int64_t estimates() const { return estimates_; }
+  /// What the estimator goes on without. @{
+  const Conditions& conditions() const { return conditions_; }
+  Conditions& conditions() { return conditions_; }
+  /// @}
   /// Received, lost, late and so on for each stream that the estimator takes, and the estimator's own counts.
   NamedCounts counts() const;
   /// What looks like a wrong unit in the calibrated measurements, for the user; empty when all is plausible.
@@ -74,6 +79,7 @@ class EstimatorPipeline {
   StreamMergerCounts earlier_;  // of the recordings before this one
   SequenceCheck sequences_;
   UnitCheck units_;
+  Conditions conditions_;
   Sink sink_;
   FrameSink frame_sink_;
   bool ended_ = false;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 #include "libloc/core/check.hpp"
@@ -33,6 +34,17 @@ PlyPoint ply_point(const SlamMapPoint& point) {
     out.sigma = std::sqrt(std::max(0.0, solver.eigenvalues().maxCoeff()));
   }
   return out;
+}
+
+std::string world_of_map(const SlamFilter& filter, const MapAnchor* anchor) {
+  if (anchor != nullptr && anchor->anchored()) {
+    const GeodeticPoint& origin = anchor->world()->origin();
+    return "east, north, up [m] of latitude " + to_text(origin.latitude * 180 / std::numbers::pi, 11) +
+           " deg, longitude " + to_text(origin.longitude * 180 / std::numbers::pi, 11) + " deg, altitude " +
+           to_text(origin.altitude, 9) + " m";
+  }
+  const bool metres = filter.options().motion == SlamMotion::kInertial || !filter.options().landmarks.empty();
+  return metres ? "world, z up [m]" : "world of the camera's start, unit of its own";
 }
 
 }  // namespace
@@ -98,7 +110,7 @@ std::optional<SlamSnapshot> slam_start(const SlamArguments& arguments, const Sla
   }
 }
 
-bool write_map(const SlamArguments& arguments, const SlamFilter* filter) {
+bool write_map(const SlamArguments& arguments, const SlamFilter* filter, const MapAnchor* anchor) {
   if (arguments.map_out.empty()) return true;
   if (filter == nullptr) {
     log_error(R"(event=no_map file="{}" reason="the filter has not started")", arguments.map_out);
@@ -112,10 +124,11 @@ bool write_map(const SlamArguments& arguments, const SlamFilter* filter) {
     return true;
   }
   std::vector<PlyPoint> points;
-  for (const SlamMapPoint& point : filter->map()) points.push_back(ply_point(point));
-  const bool metres = filter->options().motion == SlamMotion::kInertial || !filter->options().landmarks.empty();
-  const std::int64_t left_out = write_ply(
-      arguments.map_out, points, {metres ? "world, z up [m]" : "world of the camera's start, unit of its own"});
+  for (SlamMapPoint point : filter->map()) {
+    if (anchor != nullptr) anchor->put_in_world(point);
+    points.push_back(ply_point(point));
+  }
+  const std::int64_t left_out = write_ply(arguments.map_out, points, {world_of_map(*filter, anchor)});
   log_info(R"(event=map_written file="{}" points={} left_out={})", arguments.map_out,
            static_cast<std::int64_t>(points.size()) - left_out, left_out);
   return true;

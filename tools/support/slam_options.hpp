@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "libloc/estimators/map_anchor.hpp"
 #include "libloc/estimators/slam_filter.hpp"
 #include "libloc/sensors/rig.hpp"
 #include "tools/support/cli_forward.hpp"
@@ -40,8 +41,10 @@ SlamOptions slam_options(const SlamArguments& arguments, const std::string& meth
 std::optional<SlamSnapshot> slam_start(const SlamArguments& arguments, const SlamOptions& options);
 
 /// Writes --map-out: *.ply has the points, all others what --map-in can go on from. Logs what it did.
+/// Points are as in the estimates' world; what --map-in takes is as the filter has it.
 /// @param filter nullptr: it has not started; said aloud, nothing is written. @return false then
+/// @param anchor of the map to the Earth; nullptr without GPS
 /// @throws DataError when it cannot be written.
-bool write_map(const SlamArguments& arguments, const SlamFilter* filter);
+bool write_map(const SlamArguments& arguments, const SlamFilter* filter, const MapAnchor* anchor);
 
 }  // namespace loc
