@@ -2,6 +2,7 @@
 #include "libloc/core/check.hpp"
 #include "loc/clock_t.hpp"
 #include "loc/estimate_t.hpp"
+#include "loc/estimator_status_t.hpp"
 #include "loc/fusion_t.hpp"
 #include "loc/gps_fix_t.hpp"
 #include "loc/image_t.hpp"
@@ -35,6 +36,14 @@ void walk(wire::Walker& w, const estimate_t&) {
   w.string();
   w.skip(2 * 4 + (4 + 5 * 3) * 8);
   w.matrix(w.int32(), 8);
+}
+void walk(wire::Walker& w, const estimator_status_t&) {
+  w.skip(2 * 8);
+  w.string();
+  w.skip(4 + 1);
+  const std::int64_t size = w.int32();
+  for (std::int64_t i = 0; i < size && w.ok(); ++i) w.string();
+  w.array(size, 8);
 }
 void walk(wire::Walker& w, const image_t&) {
   w.skip(kStampBytes + 8 + 5 * 4);
@@ -94,6 +103,7 @@ T decode_message(std::span<const std::uint8_t> data) {
 
 template clock_t decode_message<clock_t>(std::span<const std::uint8_t>);
 template estimate_t decode_message<estimate_t>(std::span<const std::uint8_t>);
+template estimator_status_t decode_message<estimator_status_t>(std::span<const std::uint8_t>);
 template fusion_t decode_message<fusion_t>(std::span<const std::uint8_t>);
 template gps_fix_t decode_message<gps_fix_t>(std::span<const std::uint8_t>);
 template image_t decode_message<image_t>(std::span<const std::uint8_t>);

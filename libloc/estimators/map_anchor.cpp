@@ -20,6 +20,10 @@ constexpr int kWidenMost = 2;             // times, then it starts anew
 constexpr int kToldAfter = 3;             // rejections in a row
 constexpr std::uint32_t kPoseIsGuess = kLost | kFewFeatures | kNoImages | kGap | kBridged;
 
+// Places in the covariance of an estimate.
+constexpr int kP = 3;
+constexpr int kV = 6;
+
 double square(double x) {
   return x * x;
 }
@@ -149,6 +153,10 @@ void MapAnchor::carry(const Estimate& in_map, bool found) {
   last_.rotation = in_map.q_world_body;
   last_.velocity = (in_map.valid & kValidVelocity) != 0 ? in_map.velocity : Eigen::Vector3d::Zero();
   last_.angular_velocity = in_map.angular_velocity.allFinite() ? in_map.angular_velocity : Eigen::Vector3d::Zero();
+  last_.velocity_cov.setZero();
+  if ((in_map.valid & kValidCovariance) != 0 && in_map.covariance_dim >= kV + 3) {
+    last_.velocity_cov = in_map.covariance.block<3, 3>(kV, kV);
+  }
   if (before.time_ns == kNoTime) {
     drifted_at_ = in_map.position;
     return;
@@ -197,7 +205,7 @@ void MapAnchor::see_doubt(const Estimate& in_map) {
     before_ = Before{x_, covariance_, last_.position, accepted_};
   }
   if ((in_map.valid & kValidCovariance) == 0) return;
-  const double position = in_map.covariance.block<3, 3>(3, 3).trace() / 3 * square(x_.scale);
+  const double position = in_map.covariance.block<3, 3>(kP, kP).trace() / 3 * square(x_.scale);
   const double heading = heading_variance(in_map);
   const bool started = (in_map.status & kReinitialised) != 0;
   if ((lost_ || started) && anchored_ && std::isfinite(good_position_variance_)) {
@@ -333,6 +341,16 @@ void MapAnchor::take(const GpsPosition& received, const Pose& pose) {
   const Eigen::Vector3d lever_velocity = pose.rotation * pose.angular_velocity.cross(options_.gps_antenna);
   const Eigen::Vector3d velocity = to_world(pose.velocity);
   const Eigen::Vector3d way = options_.gps_time_sigma * velocity;
+  if (fix.velocity.allFinite() && (anchored_ || options_.scale_known)) {
+    // A camera alone knows its velocity less well than the receiver does. (Without a heading: as much of it as there is
+    // in any direction.)
+    const Eigen::Matrix3d turn = x_.scale * x_.q_world_map.toRotationMatrix();
+    if (anchored_) {
+      fix.velocity_cov += turn * pose.velocity_cov * turn.transpose();
+    } else {
+      fix.velocity_cov += pose.velocity_cov.trace() * Eigen::Matrix3d::Identity();
+    }
+  }
   if (anchored_) {
     fix.position_cov += way * way.transpose();
   } else if (options_.scale_known) {
@@ -445,8 +463,6 @@ void MapAnchor::look_for_start() {
 Estimate MapAnchor::in_world(const Estimate& in_map) const {
   if (!anchored_ || !has_pose(in_map)) return in_map;
   using Matrix15 = Eigen::Matrix<double, kMaxEstimateDim, kMaxEstimateDim>;
-  constexpr int kP = 3;
-  constexpr int kV = 6;
   Estimate out = in_map;
   const Eigen::Vector3d way = to_world(in_map.position - last_.position);
   out.position = x_.position + way;

@@ -108,6 +108,7 @@ class MapAnchor {
     Eigen::Vector3d position = Eigen::Vector3d::Zero();
     Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d velocity_cov = Eigen::Matrix3d::Zero();
     Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
     double way = 0;
   };

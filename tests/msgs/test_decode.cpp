@@ -31,6 +31,7 @@ TEST(DecodeMessage, gives_back_every_type_of_the_package) {
   check(test::map_points_message());
   check(test::statistics_message());
   check(test::source_status_message());
+  check(test::estimator_status_message());
   check(test::clock_message());
   check(to_message(test::gps_sample()));
   check(to_message(test::reference_sample()));
@@ -59,6 +60,7 @@ TEST(DecodeMessage, refuses_a_message_cut_at_any_byte_or_with_a_byte_too_many) {
   expect_cut_or_longer_is_refused(test::map_points_message());
   expect_cut_or_longer_is_refused(test::statistics_message());
   expect_cut_or_longer_is_refused(test::source_status_message());
+  expect_cut_or_longer_is_refused(test::estimator_status_message());
   expect_cut_or_longer_is_refused(test::clock_message());
   expect_cut_or_longer_is_refused(to_message(test::odometry_sample()));
   expect_cut_or_longer_is_refused(to_message(test::features_sample()));
@@ -92,6 +94,7 @@ TEST(DecodeMessage, impossible_lengths_do_no_harm) {
   expect_no_harm_from_lengths(test::map_points_message());
   expect_no_harm_from_lengths(test::statistics_message());
   expect_no_harm_from_lengths(test::source_status_message());
+  expect_no_harm_from_lengths(test::estimator_status_message());
   expect_no_harm_from_lengths(test::clock_message());
 }
 

@@ -10,6 +10,7 @@
 #include "aspn23_lcm/measurement_position.hpp"
 #include "aspn23_lcm/measurement_position_velocity_attitude.hpp"
 #include "libloc/sensors/measurements.hpp"
+#include "loc/estimator_status_t.hpp"
 #include "loc/map_points_t.hpp"
 #include "loc/source_status_t.hpp"
 #include "loc/statistics_t.hpp"
@@ -155,6 +156,15 @@ inline source_status_t source_status_message() {
   m.stream_name = {"imu"};
   m.published = {12};
   m.message = "end";
+  return m;
+}
+
+inline estimator_status_t estimator_status_message() {
+  estimator_status_t m{};
+  m.method = "inertial-slam";
+  m.size = 2;
+  m.condition = {"no GPS", "lost"};
+  m.since_s = {1.5, 0.25};
   return m;
 }
 
