@@ -174,6 +174,7 @@ bool AnyEstimator::process(const Measurement& measurement) {
 
 bool AnyEstimator::finish() {
   gave_estimate_ = false;
+  frame_count_ = 0;
   auto* inertial = std::get_if<InertialSlam>(&implementation_);
   frames_are_new_ = inertial != nullptr;
   if (inertial != nullptr) gave_estimate_ = inertial->finish();
