@@ -11,6 +11,7 @@ void bind_camera(pybind11::module_& m);
 void bind_camera_calibration(pybind11::module_& m);
 void bind_vision(pybind11::module_& m);
 void bind_geo_export(pybind11::module_& m);
+void bind_map_anchor(pybind11::module_& m);
 void bind_geometry(pybind11::module_& m);
 void bind_sensors(pybind11::module_& m);
 void bind_estimators(pybind11::module_& m);

@@ -26,6 +26,7 @@ PYBIND11_MODULE(_core, m) {
   locpy::bind_vision(m);
   locpy::bind_slam_options(m);
   locpy::bind_slam(m);
+  locpy::bind_map_anchor(m);
   locpy::bind_slam_files(m);
   locpy::bind_image_slam(m);
   locpy::bind_simulated_sensors(m);

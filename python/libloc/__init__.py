@@ -15,6 +15,7 @@ from libloc.recordings import file_format as file_format
 from libloc.recordings import open_recording as open_recording
 from libloc.recordings import read_recording as read_recording
 from libloc.slam import FrameFeatures as FrameFeatures
+from libloc.slam import anchor_slam as anchor_slam
 from libloc.slam import features_of_frames as features_of_frames
 from libloc.slam import features_of_tracks as features_of_tracks
 from libloc.slam import run_slam as run_slam

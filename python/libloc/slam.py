@@ -10,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from libloc._core import (
+    AnchoredRun,
     FeaturesArrays,
+    GpsArrays,
     ImuArrays,
     InertialSlam,
+    MapAnchorOptions,
     MeasurementSource,
     MonoSlam,
     Recording,
@@ -22,6 +25,7 @@ from libloc._core import (
     SlamRun,
     SlamSnapshot,
     TriadCalibration,
+    anchor_run,
 )
 from libloc.recordings import read_recording
 
@@ -136,3 +140,36 @@ def run_slam(
     if start_from is not None:
         inertial.restore(start_from)
     return inertial.run(*frames, imu.times_ns, gyro, force, finish=True, **settings)
+
+
+def anchor_slam(
+    run: SlamRun,
+    gps: GpsArrays,
+    options: MapAnchorOptions | None = None,
+    *,
+    inertial: bool = True,
+    rig: Rig | None = None,
+) -> AnchoredRun:
+    """Puts a run of SLAM on the Earth, as loc-estimator does it: position, heading and, for a camera alone
+    (inertial=False), scale and tilt of its map by the fixes of a recording (Recording.gps).
+
+    rig: lever arm of the antenna and offset of its clock (t_imu = t_gps + offset).
+    """
+    if options is None:
+        options = MapAnchorOptions(inertial)
+    times_ns = gps.times_ns
+    if rig is not None and rig.gps is not None:
+        options.gps_antenna = rig.gps.antenna_in_body
+        times_ns = times_ns + round(rig.gps.time_offset_s * 1e9)
+        if np.isfinite(rig.gps.time_offset_sigma_s):
+            options.gps_time_sigma = rig.gps.time_offset_sigma_s
+    return anchor_run(
+        run,
+        times_ns,
+        gps.latitude_longitude_altitude,
+        options,
+        position_cov=gps.position_cov,
+        velocity_enu=gps.velocity_enu,
+        velocity_cov=gps.velocity_cov,
+        fix=gps.fix,
+    )

@@ -9,7 +9,7 @@ import numpy.typing
 import os
 import typing
 from . import so3
-__all__: list[str] = ['AbsoluteError', 'AccelerometerFit', 'AccelerometerOptions', 'Alignment', 'AllanFit', 'AllanOptions', 'AllanTerm', 'Association', 'CalibrationTarget', 'Camera', 'CameraCalibration', 'CameraFit', 'CameraFitOptions', 'CameraFitView', 'CameraModel', 'CameraRun', 'CarMotion', 'CircleMotion', 'ClockCalibration', 'ClockCalibrationResult', 'ClockChain', 'ClockLine', 'ClockModel', 'Consistency', 'CounterUnwrapper', 'DataError', 'DiscreteImuNoise', 'DistortionModel', 'ESTIMATE_CHANNEL', 'EllipsoidAdvice', 'EllipsoidCollector', 'EllipsoidFit', 'EllipsoidOptions', 'EqvioSource', 'ErrorStateFilter', 'ErrorStateOptions', 'ErrorStateRun', 'ErrorStatistics', 'Estimate', 'EstimateStatus', 'EstimateValid', 'FUSION_CHANNEL', 'FeatureTracker', 'FeatureTrackerOptions', 'FeatureTrackerTimes', 'FeatureVideo', 'FeaturesArrays', 'FeaturesMeasurement', 'FigureEightMotion', 'FusionOutcome', 'FusionPreset', 'FusionPresetSensors', 'FusionResult', 'FusionStartOptions', 'GPS_CHANNEL', 'GpsArrays', 'GpsCalibration', 'GpsClock', 'GpsFixType', 'GpsMeasurement', 'GpsModel', 'GyroscopeFit', 'GyroscopeOptions', 'HAS_VISION', 'HandHeldMotion', 'IMAGE_CHANNEL', 'IMU_CHANNEL', 'ImageMeasurement', 'ImageSlam', 'ImuAllan', 'ImuArrays', 'ImuCalibration', 'ImuIntegration', 'ImuMeasurement', 'ImuModel', 'ImuNoise', 'ImuNoiseFit', 'ImuSampleModel', 'ImuSampling', 'InertialSlam', 'InertialTriadModel', 'InverseDepthPoint', 'KnownLandmark', 'LcmLogReader', 'LocalFrame', 'LookAtMotion', 'MAGNETOMETER_CHANNEL', 'MadgwickFilter', 'MadgwickOptions', 'MadgwickResult', 'MagnetometerAlignment', 'MagnetometerAlignmentOptions', 'MagnetometerArrays', 'MagnetometerCalibration', 'MagnetometerMeasurement', 'MagnetometerModel', 'MeasurementSource', 'MonoSlam', 'Motion', 'MotionArrays', 'MountedMotion', 'NO_TIME', 'NmeaFixes', 'ODOMETRY_CHANNEL', 'OdometryArrays', 'OdometryMeasurement', 'OrientationError', 'PedestrianMotion', 'Pose3', 'PredictOutcome', 'Quality', 'REFERENCE_CHANNEL', 'Random', 'Recording', 'ReferenceArrays', 'ReferenceMeasurement', 'RelativeError', 'RestFirstMotion', 'RestMotion', 'RestNoise', 'Rig', 'SOURCE_STATUS_CHANNEL', 'STATISTICS_CHANNEL', 'Scenario', 'ScenarioStreams', 'Scene', 'SceneRenderer', 'SimulatedRun', 'Simulation', 'SlamAssociationOptions', 'SlamConsistency', 'SlamCounts', 'SlamFeatureArrays', 'SlamFeatureState', 'SlamFile', 'SlamFrame', 'SlamLandmarkArrays', 'SlamMapArrays', 'SlamMapOptions', 'SlamMotion', 'SlamOptions', 'SlamPrecision', 'SlamPredictionArrays', 'SlamRun', 'SlamSnapshot', 'SlamStartOptions', 'StandStillOptions', 'StillSegment', 'Stillness', 'StillnessDetector', 'StillnessOptions', 'StreamClockModel', 'StreetModel', 'TRACKS_CHANNEL', 'TargetDetection', 'TargetDetector', 'TargetView', 'TimeOffsetResult', 'TrackArrays', 'TrackOrigin', 'Trajectory', 'TriadCalibration', 'TriadQuality', 'TruthArrays', 'Verdict', 'VisualOdometryModel', 'WaypointMotion', 'absolute_error', 'align_magnetometer', 'align_points', 'aligned', 'allan_fit', 'analyse_imu_noise', 'april_grid', 'associate', 'average_consistency', 'beta_from_gyro', 'box_room', 'calibrate_camera', 'calibrate_clock', 'checkerboard', 'chi_square_cdf', 'chi_square_quantile', 'choose_views', 'decode_image', 'discretise', 'error_statistics', 'estimate_time_offset', 'euroc_cameras', 'example_drive', 'find_stillness', 'finds_april_grids', 'fit_accelerometer', 'fit_accelerometer_poses', 'fit_ellipsoid', 'fit_gyroscope', 'fit_gyroscope_bias', 'format_seconds', 'gps_from_unix', 'image_array', 'image_measurement', 'imu_noise_from', 'is_eqvio', 'leap_seconds_known_until', 'load_slam', 'local_positions', 'message_fingerprints', 'message_type', 'normalised_error_squared', 'open_broad', 'open_csv', 'open_eqvio', 'open_euroc', 'open_euroc_images', 'open_image_folder', 'open_lcm_log', 'open_nmea', 'open_video', 'orientation_error', 'parse_nmea', 'parse_seconds', 'quantile', 'read_any_rig', 'read_points', 'read_rig', 'read_slam_options', 'read_tracks', 'read_tum', 'relative_error', 'root_mean_square', 'sampled_path', 'save_slam', 'scenario_names', 'simulate', 'simulate_camera', 'simulate_clock', 'simulate_gps_time', 'slam_options_for_images', 'slam_options_text', 'so3', 'street', 'unix_from_gps', 'update_rig', 'write_geojson', 'write_gpx', 'write_kml', 'write_ply', 'write_points', 'write_rig', 'write_slam_options', 'write_tracks', 'write_tum']
+__all__: list[str] = ['AbsoluteError', 'AccelerometerFit', 'AccelerometerOptions', 'Alignment', 'AllanFit', 'AllanOptions', 'AllanTerm', 'AnchoredRun', 'Association', 'CalibrationTarget', 'Camera', 'CameraCalibration', 'CameraFit', 'CameraFitOptions', 'CameraFitView', 'CameraModel', 'CameraRun', 'CarMotion', 'CircleMotion', 'ClockCalibration', 'ClockCalibrationResult', 'ClockChain', 'ClockLine', 'ClockModel', 'Consistency', 'CounterUnwrapper', 'DataError', 'DiscreteImuNoise', 'DistortionModel', 'ESTIMATE_CHANNEL', 'EllipsoidAdvice', 'EllipsoidCollector', 'EllipsoidFit', 'EllipsoidOptions', 'EqvioSource', 'ErrorStateFilter', 'ErrorStateOptions', 'ErrorStateRun', 'ErrorStatistics', 'Estimate', 'EstimateStatus', 'EstimateValid', 'FUSION_CHANNEL', 'FeatureTracker', 'FeatureTrackerOptions', 'FeatureTrackerTimes', 'FeatureVideo', 'FeaturesArrays', 'FeaturesMeasurement', 'FigureEightMotion', 'FusionOutcome', 'FusionPreset', 'FusionPresetSensors', 'FusionResult', 'FusionStartOptions', 'GPS_CHANNEL', 'GpsArrays', 'GpsCalibration', 'GpsClock', 'GpsFixType', 'GpsMeasurement', 'GpsModel', 'GyroscopeFit', 'GyroscopeOptions', 'HAS_VISION', 'HandHeldMotion', 'IMAGE_CHANNEL', 'IMU_CHANNEL', 'ImageMeasurement', 'ImageSlam', 'ImuAllan', 'ImuArrays', 'ImuCalibration', 'ImuIntegration', 'ImuMeasurement', 'ImuModel', 'ImuNoise', 'ImuNoiseFit', 'ImuSampleModel', 'ImuSampling', 'InertialSlam', 'InertialTriadModel', 'InverseDepthPoint', 'KnownLandmark', 'LcmLogReader', 'LocalFrame', 'LookAtMotion', 'MAGNETOMETER_CHANNEL', 'MadgwickFilter', 'MadgwickOptions', 'MadgwickResult', 'MagnetometerAlignment', 'MagnetometerAlignmentOptions', 'MagnetometerArrays', 'MagnetometerCalibration', 'MagnetometerMeasurement', 'MagnetometerModel', 'MapAnchorOptions', 'MeasurementSource', 'MonoSlam', 'Motion', 'MotionArrays', 'MountedMotion', 'NO_TIME', 'NmeaFixes', 'ODOMETRY_CHANNEL', 'OdometryArrays', 'OdometryMeasurement', 'OrientationError', 'PedestrianMotion', 'Pose3', 'PredictOutcome', 'Quality', 'REFERENCE_CHANNEL', 'Random', 'Recording', 'ReferenceArrays', 'ReferenceMeasurement', 'RelativeError', 'RestFirstMotion', 'RestMotion', 'RestNoise', 'Rig', 'SOURCE_STATUS_CHANNEL', 'STATISTICS_CHANNEL', 'Scenario', 'ScenarioStreams', 'Scene', 'SceneRenderer', 'SimulatedRun', 'Simulation', 'SlamAssociationOptions', 'SlamConsistency', 'SlamCounts', 'SlamFeatureArrays', 'SlamFeatureState', 'SlamFile', 'SlamFrame', 'SlamLandmarkArrays', 'SlamMapArrays', 'SlamMapOptions', 'SlamMotion', 'SlamOptions', 'SlamPrecision', 'SlamPredictionArrays', 'SlamRun', 'SlamSnapshot', 'SlamStartOptions', 'StandStillOptions', 'StillSegment', 'Stillness', 'StillnessDetector', 'StillnessOptions', 'StreamClockModel', 'StreetModel', 'TRACKS_CHANNEL', 'TargetDetection', 'TargetDetector', 'TargetView', 'TimeOffsetResult', 'TrackArrays', 'TrackOrigin', 'Trajectory', 'TriadCalibration', 'TriadQuality', 'TruthArrays', 'Verdict', 'VisualOdometryModel', 'WaypointMotion', 'absolute_error', 'align_magnetometer', 'align_points', 'aligned', 'allan_fit', 'analyse_imu_noise', 'anchor_run', 'april_grid', 'associate', 'average_consistency', 'beta_from_gyro', 'box_room', 'calibrate_camera', 'calibrate_clock', 'checkerboard', 'chi_square_cdf', 'chi_square_quantile', 'choose_views', 'decode_image', 'discretise', 'error_statistics', 'estimate_time_offset', 'euroc_cameras', 'example_drive', 'find_stillness', 'finds_april_grids', 'fit_accelerometer', 'fit_accelerometer_poses', 'fit_ellipsoid', 'fit_gyroscope', 'fit_gyroscope_bias', 'format_seconds', 'gps_from_unix', 'image_array', 'image_measurement', 'imu_noise_from', 'is_eqvio', 'leap_seconds_known_until', 'load_slam', 'local_positions', 'message_fingerprints', 'message_type', 'normalised_error_squared', 'open_broad', 'open_csv', 'open_eqvio', 'open_euroc', 'open_euroc_images', 'open_image_folder', 'open_lcm_log', 'open_nmea', 'open_video', 'orientation_error', 'parse_nmea', 'parse_seconds', 'quantile', 'read_any_rig', 'read_points', 'read_rig', 'read_slam_options', 'read_tracks', 'read_tum', 'relative_error', 'root_mean_square', 'sampled_path', 'save_slam', 'scenario_names', 'simulate', 'simulate_camera', 'simulate_clock', 'simulate_gps_time', 'slam_options_for_images', 'slam_options_text', 'so3', 'street', 'unix_from_gps', 'update_rig', 'write_geojson', 'write_gpx', 'write_kml', 'write_ply', 'write_points', 'write_rig', 'write_slam_options', 'write_tracks', 'write_tum']
 class DataError(ValueError):
     """
     What is wrong in a file or message: where (file, line or byte), which field, which value.
@@ -1307,20 +1307,27 @@ class EstimateStatus(enum.IntFlag):
     AT_REST: typing.ClassVar[EstimateStatus]
     BAD_COVARIANCE: typing.ClassVar[EstimateStatus]
     BRIDGED: typing.ClassVar[EstimateStatus]
+    CALIBRATION_DOUBTFUL: typing.ClassVar[EstimateStatus]
     FEATURES_REJECTED: typing.ClassVar[EstimateStatus]
     FEW_FEATURES: typing.ClassVar[EstimateStatus]
     GAP: typing.ClassVar[EstimateStatus]
     GPS_REJECTED: typing.ClassVar[EstimateStatus]
     INITIALISING: typing.ClassVar[EstimateStatus]
+    LOST: typing.ClassVar[EstimateStatus]
     MAGNETOMETER_DISTURBED: typing.ClassVar[EstimateStatus]
     MAGNETOMETER_IGNORED: typing.ClassVar[EstimateStatus]
     MAGNETOMETER_MISSING: typing.ClassVar[EstimateStatus]
     NOT_FINITE: typing.ClassVar[EstimateStatus]
+    NO_GPS: typing.ClassVar[EstimateStatus]
+    NO_IMAGES: typing.ClassVar[EstimateStatus]
+    NO_IMU: typing.ClassVar[EstimateStatus]
     ODOMETRY_REJECTED: typing.ClassVar[EstimateStatus]
     OUT_OF_RANGE: typing.ClassVar[EstimateStatus]
     RECOVERED: typing.ClassVar[EstimateStatus]
+    REFOUND: typing.ClassVar[EstimateStatus]
     REINITIALISED: typing.ClassVar[EstimateStatus]
     SCALE_UNKNOWN: typing.ClassVar[EstimateStatus]
+    TILT_DOUBTFUL: typing.ClassVar[EstimateStatus]
     TIME_NOT_INCREASING: typing.ClassVar[EstimateStatus]
     TOO_LATE: typing.ClassVar[EstimateStatus]
     @classmethod
@@ -6162,6 +6169,242 @@ class InertialSlam:
     @property
     def running(self) -> bool:
         ...
+class MapAnchorOptions:
+    """
+    How GPS ties a map to the Earth. MapAnchorOptions(inertial=True) is for real receivers and a map in metres; every field is a keyword of the constructor.
+    """
+    use_gps_velocity: bool
+    def __init__(self, inertial: bool = True, **kwargs) -> None:
+        """
+        TypeError for an unknown field; ValueError for a value out of range.
+        """
+    @property
+    def gate_probability(self) -> float:
+        ...
+    @gate_probability.setter
+    def gate_probability(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gps_antenna(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) lever arm in body axes [m]
+        """
+    @gps_antenna.setter
+    def gps_antenna(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def gps_correlation_time_s(self) -> float:
+        """
+        [s]; 0: white
+        """
+    @gps_correlation_time_s.setter
+    def gps_correlation_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gps_sigma(self) -> float:
+        """
+        of a fix that does not say, horizontal [m]
+        """
+    @gps_sigma.setter
+    def gps_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gps_sigma_floor(self) -> float:
+        """
+        [m]
+        """
+    @gps_sigma_floor.setter
+    def gps_sigma_floor(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gps_time_sigma(self) -> float:
+        """
+        [s]
+        """
+    @gps_time_sigma.setter
+    def gps_time_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gps_velocity_sigma(self) -> float:
+        """
+        [m/s]
+        """
+    @gps_velocity_sigma.setter
+    def gps_velocity_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gps_velocity_sigma_floor(self) -> float:
+        """
+        [m/s]
+        """
+    @gps_velocity_sigma_floor.setter
+    def gps_velocity_sigma_floor(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def heading_walk(self) -> float:
+        """
+        [rad/sqrt(m)]
+        """
+    @heading_walk.setter
+    def heading_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def history_s(self) -> float:
+        """
+        a fix may be so late [s]
+        """
+    @history_s.setter
+    def history_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def origin(self) -> tuple[float, float, float] | None:
+        """
+        of world: latitude, longitude [rad], altitude [m]; None: the first fix
+        """
+    @origin.setter
+    def origin(self, arg1: tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex] | None) -> None:
+        ...
+    @property
+    def outage_s(self) -> float:
+        """
+        [s]
+        """
+    @outage_s.setter
+    def outage_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_walk(self) -> float:
+        """
+        of the map [m/sqrt(m)]
+        """
+    @position_walk.setter
+    def position_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def reject_count(self) -> int:
+        ...
+    @reject_count.setter
+    def reject_count(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def reject_time_s(self) -> float:
+        ...
+    @reject_time_s.setter
+    def reject_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def scale_known(self) -> bool:
+        """
+        The map is in metres; otherwise scale and tilt are found, too.
+        """
+    @scale_known.setter
+    def scale_known(self, arg0: bool) -> None:
+        ...
+    @property
+    def scale_sigma(self) -> float:
+        """
+        of a scale that is known, relative
+        """
+    @scale_sigma.setter
+    def scale_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def scale_walk(self) -> float:
+        """
+        relative [1/sqrt(m)]
+        """
+    @scale_walk.setter
+    def scale_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def start_heading_sigma(self) -> float:
+        """
+        [rad]
+        """
+    @start_heading_sigma.setter
+    def start_heading_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def start_scale_sigma(self) -> float:
+        """
+        relative
+        """
+    @start_scale_sigma.setter
+    def start_scale_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def tilt_sigma(self) -> float:
+        """
+        of the map's z against the vertical [rad]
+        """
+    @tilt_sigma.setter
+    def tilt_sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def tilt_walk(self) -> float:
+        """
+        [rad/sqrt(m)]
+        """
+    @tilt_walk.setter
+    def tilt_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class AnchoredRun:
+    """
+    A run of SLAM on the Earth; rows as those of the SlamRun.
+    """
+    @property
+    def counts(self) -> dict[str, int]:
+        ...
+    @property
+    def covariance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, d, d), as SlamRun's; (0, 0, 0) when that has none
+        """
+    @property
+    def georeferenced(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        (N,) bool; False: as in the map
+        """
+    @property
+    def origin(self) -> tuple[float, float, float] | None:
+        """
+        latitude, longitude [rad], altitude [m]; None when GPS never told enough
+        """
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) east, north, up of origin [m]
+        """
+    @property
+    def q_world_body_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 4)
+        """
+    @property
+    def scale(self) -> float:
+        """
+        metres a unit of the map, at the end
+        """
+    @property
+    def status(self) -> numpy.typing.NDArray[numpy.uint32]:
+        """
+        (N,) uint32, EstimateStatus
+        """
+    @property
+    def time_ns(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (N,) int64
+        """
+    @property
+    def valid(self) -> numpy.typing.NDArray[numpy.uint32]:
+        """
+        (N,) uint32, EstimateValid
+        """
+    @property
+    def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) [m/s]
+        """
 class SlamFile:
     """
     A saved map and state.
@@ -7271,6 +7514,10 @@ def allan_fit(values: numpy.typing.NDArray[numpy.float64], rate_hz: typing.Suppo
 def analyse_imu_noise(times_ns: numpy.typing.NDArray[numpy.int64], gyroscope: numpy.typing.NDArray[numpy.float64] | None, accelerometer: numpy.typing.NDArray[numpy.float64] | None, options: AllanOptions = ..., stillness: StillnessOptions = ...) -> ImuAllan:
     """
     int64 (N,); float64 (N, 3) [rad/s] and [m/s^2], one may be None. Bad data do not raise: see quality.
+    """
+def anchor_run(run: SlamRun, gps_times_ns: numpy.typing.NDArray[numpy.int64], latitude_longitude_altitude: numpy.typing.NDArray[numpy.float64], options: MapAnchorOptions, *, position_cov: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, velocity_enu: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, velocity_cov: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, fix: typing.Annotated[numpy.typing.ArrayLike, numpy.int8] | None = None) -> AnchoredRun:
+    """
+    What loc-estimator does with GPS, for a run that is there already: fixes (K,) in the order of time, fields as those of Recording.gps. Rows from before the start are put on the Earth by what was known then.
     """
 def april_grid(*, columns: typing.SupportsInt | typing.SupportsIndex = 6, rows: typing.SupportsInt | typing.SupportsIndex = 6, tag_m: typing.SupportsFloat | typing.SupportsIndex = 0.088, spacing: typing.SupportsFloat | typing.SupportsIndex = 0.3, first_tag: typing.SupportsInt | typing.SupportsIndex = 0, corner_squares: bool = True) -> Scene:
     """

@@ -281,8 +281,12 @@ def run(options: argparse.Namespace) -> SlamResult:
         frames = len(front_end["time_ns"])
         if ran.stopped and given.pictures.total is not None:
             frames = given.pictures.total
+    world = None
+    if given.gps is not None and len(given.gps.times_ns) > 0 and len(ran) > 0:
+        inertial = slam.motion == libloc.SlamMotion.INERTIAL
+        world = libloc.anchor_slam(ran, given.gps, inertial=inertial, rig=given.rig)
     return SlamResult(
-        given, method_of(slam), slam, ran, frames, truth, failure, elapsed_s, front_end, watcher
+        given, method_of(slam), slam, ran, frames, truth, failure, elapsed_s, front_end, watcher, world
     )
 
 

@@ -31,6 +31,7 @@ class SlamInput:
     counts: dict[str, int] = field(default_factory=dict)  # what was read and skipped, and why
     images: int = 0  # pictures in a recording
     pictures: PictureInput | None = None  # in place of features
+    gps: libloc.GpsArrays | None = None
 
 
 def _is_tracks_file(path: Path) -> bool:
@@ -140,7 +141,8 @@ def _read_pictures(pictures: PictureInput, rig: libloc.Rig | None, options: argp
     if recording is not None and not options.reference:
         reference = _own_reference(options.imu or path, pictures.form, recording)
     counts = {} if recording is None else dict(recording.counts)
-    return SlamInput(path, pictures.form, None, imu, rig, reference, counts, pictures=pictures)
+    gps = None if recording is None else recording.gps
+    return SlamInput(path, pictures.form, None, imu, rig, reference, counts, pictures=pictures, gps=gps)
 
 
 def _read_features(path: Path, rig: libloc.Rig | None, options: argparse.Namespace) -> SlamInput:
@@ -157,6 +159,7 @@ def _read_features(path: Path, rig: libloc.Rig | None, options: argparse.Namespa
     reference = None if options.reference else _own_reference(path, form, recording)
     given = SlamInput(path, form, recording.features, recording.imu, rig, reference, recording.counts)
     given.images = recording.images
+    given.gps = recording.gps
     if options.tracks is not None:
         if options.start_time is None:
             raise DataError(

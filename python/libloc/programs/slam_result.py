@@ -17,6 +17,7 @@ from libloc.programs.evaluate_input import Poses
 from libloc.programs.slam_input import SlamInput
 from libloc.programs.slam_pictures import Watcher, at_frames, profile, whole_s
 
+_YEAR_1980_NS = 315_532_800_000_000_000  # a clock that says less counts from its own start
 _FAR = 1e9  # [m]: what is farther is as good as at infinity
 
 
@@ -59,6 +60,7 @@ class SlamResult:
         None  # from pictures: a row for each, see ImageSlam.recorded()
     )
     watcher: Watcher | None = None
+    world: libloc.AnchoredRun | None = None  # where there is GPS
 
     @property
     def unit(self) -> str:
@@ -151,6 +153,13 @@ def _mean_square(values: NDArray[np.float64]) -> float | None:
     return float(np.sqrt(np.mean(finite**2))) if len(finite) else None
 
 
+def _world_sigma(world: libloc.AnchoredRun) -> float | None:
+    """Of the last position, horizontal [m]."""
+    if len(world.covariance) == 0:
+        return None
+    return float(np.sqrt(np.trace(world.covariance[-1][3:5, 3:5])))
+
+
 def report(result: SlamResult) -> dict[str, Any]:
     """All figures; what is not known is None."""
     run, given = result.run, result.given
@@ -200,6 +209,14 @@ def report(result: SlamResult) -> dict[str, Any]:
             for name in ("tracks", "searched", "klt", "cut_anew", "refound", "new", "lost")
         } | {"count": len(pictures["time_ns"])}
         out["profile_ms"] = profile(run, pictures)
+    if result.world is not None:
+        out["world"] = {"origin": result.world.origin, "counts": result.world.counts}
+        if result.world.origin is not None:
+            out["world"] |= {
+                "frames": int(result.world.georeferenced.sum()),
+                "metres_per_unit": result.world.scale,
+                "sigma_m": _world_sigma(result.world),
+            }
     if result.truth is not None:
         truth = result.truth
         error = truth.absolute
@@ -291,6 +308,16 @@ def text_of(out: dict[str, Any]) -> str:
     line("map", f"{m['points']} points, {m['xyz']} of them as XYZ")
     if out["status"]:
         line("status", ", ".join(f"{name} {count}" for name, count in out["status"].items()) + " (frames)")
+    if "world" in out:
+        w = out["world"]
+        fixes = w["counts"].get("gps.accepted", 0)
+        if w["origin"] is None:
+            line("world", "GPS did not tell where the map is (too few fixes, or too short a way)")
+        else:
+            latitude, longitude = np.rad2deg(w["origin"][:2])
+            sigma = "" if w["sigma_m"] is None else f", at the end within {w['sigma_m']:.2f} m (1 sigma)"
+            line("world", f"by GPS: origin {latitude:.7f}, {longitude:.7f} deg, {fixes} fixes{sigma}")
+            line("", f"{w['metres_per_unit']:.4f} metres a unit of the map")
     if "truth" in out:
         t = out["truth"]
         scale = f", scale {t['scale']:.6f}" if t["alignment"] == "sim3" else ""
@@ -399,6 +426,19 @@ def write_trajectory(run: SlamRun, pose: str, path: Path) -> None:
     libloc.write_tum(path, trajectory, pose)
 
 
+def write_world(world: libloc.AnchoredRun, folder: Path) -> list[Path]:
+    """The path on the Earth: east, north, up of the origin as TUM, and GPX."""
+    rows = world.georeferenced
+    trajectory = libloc.Trajectory(world.time_ns[rows], world.q_world_body_wxyz[rows], world.position[rows])
+    paths = [folder / "world.tum", folder / "world.gpx"]
+    libloc.write_tum(paths[0], trajectory, "body")
+    places = libloc.LocalFrame(*world.origin).to_geodetic(np.ascontiguousarray(world.position[rows]))
+    utc_ns = np.ascontiguousarray(world.time_ns[rows])
+    time_of_day = len(utc_ns) > 0 and utc_ns[0] >= _YEAR_1980_NS
+    libloc.write_gpx(paths[1], places, utc_ns=utc_ns if time_of_day else None, name="libloc")
+    return paths
+
+
 def write(result: SlamResult, out: dict[str, Any], pose: str, pictures: bool, folder: Path) -> list[Path]:
     """Writes everything into the folder; gives the paths."""
     paths = [folder / "summary.json", folder / "summary.txt"]
@@ -415,6 +455,8 @@ def write(result: SlamResult, out: dict[str, Any], pose: str, pictures: bool, fo
     ):
         function(folder / name)
         paths.append(folder / name)
+    if result.world is not None and result.world.origin is not None:
+        paths += write_world(result.world, folder)
     if pictures:
         from libloc.programs import slam_plots
 
