@@ -538,7 +538,7 @@ void InertialSlam::take_frame(const FeaturesMeasurement& frame) {
   const SlamFrame& done = filter_.update(frame, status_ | (at_rest_ ? kAtRest : 0U));
   ++frames_used_;
   if ((done.estimate.status & kFewFeatures) == 0) last_good_frame_ns_ = filter_.time_ns();
-  frame_status_ = done.estimate.status & (kFewFeatures | kFeaturesRejected);
+  frame_status_ = done.estimate.status & (kFewFeatures | kFeaturesRejected | kCalibrationDoubtful);
   recover(done);
   if (frame_count_ == frames_.size()) frames_.emplace_back();
   SlamFrame& out = frames_[frame_count_++];

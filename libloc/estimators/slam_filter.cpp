@@ -46,6 +46,7 @@ SlamFilter::SlamFilter(const SlamOptions& options)
       transition_(layout_),
       ahead_(layout_),
       ransac_(options.association, options.motion, options.map.max_measured),
+      watch_(options.camera, {.judge_centre = options.motion == SlamMotion::kInertial}),
       dx_(covariance_.capacity()),
       shear_(covariance_.capacity(), 3) {
   const auto features = static_cast<std::size_t>(options.map.max_features);
@@ -82,6 +83,7 @@ void SlamFilter::start(TimeNs time_ns, const SlamState& state, const Eigen::Matr
   frame_.counts = SlamCounts{};
   frame_.features.clear();
   expected_.clear();
+  watch_.break_off();
   add_known_landmarks();
 }
 
@@ -212,6 +214,8 @@ const SlamFrame& SlamFilter::update(const FeaturesMeasurement& frame, std::uint3
   frame_.estimate.status |= status;
   if (counts.measured + counts.added < kFewest) frame_.estimate.status |= kFewFeatures;
   if (counts.rejected > counts.measured) frame_.estimate.status |= kFeaturesRejected;
+  watch_.see(frame_);
+  if (watch_.doubtful()) frame_.estimate.status |= kCalibrationDoubtful;
   frame_.time_spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return frame_;
 }

@@ -26,6 +26,7 @@
 #include <vector>
 
 #include "libloc/core/named_count.hpp"
+#include "libloc/estimators/residual_watch.hpp"
 #include "libloc/estimators/slam_frame.hpp"
 #include "libloc/estimators/slam_observation.hpp"
 #include "libloc/estimators/slam_options.hpp"
@@ -114,6 +115,8 @@ class SlamFilter {
   const std::vector<SlamLandmark>& landmarks() const { return landmarks_; }
   const SlamFrame& frame() const { return frame_; }
   const MapCovariance& covariance() const { return covariance_; }
+  /// Whether the camera's intrinsics can be right (kCalibrationDoubtful); of all frames so far, over restarts.
+  const ResidualWatch& residual_watch() const { return watch_; }
   /// Covariance of the head now, also between frames.
   Eigen::MatrixXd head_covariance() const;
   /// Pose, velocity, biases, their covariance; stamp and sequence are the caller's.
@@ -172,6 +175,7 @@ class SlamFilter {
   SlamTransition transition_;
   mutable SlamTransition ahead_;  // of predict_frame
   OnePointRansac ransac_;
+  ResidualWatch watch_;
   TimeNs time_ns_ = kNoTime;
   SlamState state_;
   SlamState first_;                      // of this time, before any update: for first-estimate Jacobians
