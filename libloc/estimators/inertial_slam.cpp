@@ -439,7 +439,7 @@ void InertialSlam::step_to(TimeNs time_ns, const ImuMeasurement& to) {
 
 void InertialSlam::predict_frame(TimeNs time_ns, SlamPrediction& out) const {
   out.time_ns = time_ns;
-  out.valid = false;
+  out.valid = out.lost = false;
   out.features.clear();
   if (!filter_.started() || restored_ || !SlamFilter::is_usable(time_ns)) return;
   const double ahead = to_seconds(on_imu_clock(time_ns) - filter_.time_ns());
@@ -530,7 +530,11 @@ void InertialSlam::run(const ImuMeasurement& imu) {
     forget_early();
     return;
   }
-  if (to_seconds(imu.time_ns - last_good_frame_ns_) > options().lost_after_s) status_ |= kFewFeatures;
+  if (to_seconds(imu.time_ns - last_good_frame_ns_) > options().lost_after_s) {
+    status_ |= kFewFeatures;
+    filter_.lose();
+  }
+  if (filter_.lost()) status_ |= kLost;
 }
 
 void InertialSlam::take_frame(const FeaturesMeasurement& frame) {
@@ -539,6 +543,7 @@ void InertialSlam::take_frame(const FeaturesMeasurement& frame) {
   ++frames_used_;
   if ((done.estimate.status & kFewFeatures) == 0) last_good_frame_ns_ = filter_.time_ns();
   frame_status_ = done.estimate.status & (kFewFeatures | kFeaturesRejected | kCalibrationDoubtful);
+  status_ |= done.estimate.status & kRefound;
   recover(done);
   if (frame_count_ == frames_.size()) frames_.emplace_back();
   SlamFrame& out = frames_[frame_count_++];

@@ -61,8 +61,12 @@ void MonoSlam::predict_frame(TimeNs time_ns, SlamPrediction& out) const {
     filter_.predict_frame(time_ns, out);
     return;
   }
+  if (filter_.started() && !restored_ && SlamFilter::is_usable(time_ns) && time_ns > filter_.time_ns()) {
+    filter_.predict_lost(time_ns, out);
+    return;
+  }
   out.time_ns = time_ns;
-  out.valid = false;
+  out.valid = out.lost = false;
   out.features.clear();
 }
 

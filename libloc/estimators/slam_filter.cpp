@@ -84,6 +84,7 @@ void SlamFilter::start(TimeNs time_ns, const SlamState& state, const Eigen::Matr
   frame_.features.clear();
   expected_.clear();
   watch_.break_off();
+  forget_location();
   add_known_landmarks();
 }
 
@@ -188,13 +189,14 @@ const SlamFrame& SlamFilter::update(const FeaturesMeasurement& frame, std::uint3
   select_measured(frame);
   update_agreeing(frame);
   rescue(frame);
+  locate(frame);
   judge(frame);
   const Pose3 T_world_camera = state_.T_world_camera();
   frame_.camera_position = T_world_camera.translation;
   frame_.q_world_camera = T_world_camera.rotation;
   convert_landmarks();
   delete_landmarks();
-  add_landmarks(frame);
+  if (found_ || !looks_for_map()) add_landmarks(frame);
   report(frame);
 
   SlamCounts& counts = frame_.counts;
@@ -216,6 +218,8 @@ const SlamFrame& SlamFilter::update(const FeaturesMeasurement& frame, std::uint3
   if (counts.rejected > counts.measured) frame_.estimate.status |= kFeaturesRejected;
   watch_.see(frame_);
   if (watch_.doubtful()) frame_.estimate.status |= kCalibrationDoubtful;
+  if (lost_) frame_.estimate.status |= kLost;
+  if (refound_) frame_.estimate.status |= kRefound;
   frame_.time_spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return frame_;
 }
@@ -236,19 +240,18 @@ void SlamFilter::predict_frame(TimeNs time_ns, const InertialStep& step, const I
   predict_frame_at(ahead, time_ns, out);
 }
 
-// With x' = F x + noise of Q: S = (H F) P (H F)^T + H_h Q H_h^T + R, so that P stays as it is.
-void SlamFilter::predict_frame_at(const SlamState& ahead, TimeNs time_ns, SlamPrediction& out) const {
+void SlamFilter::predict_lost(TimeNs time_ns, SlamPrediction& out) const {
   out.time_ns = time_ns;
-  out.valid = true;
-  out.T_world_camera = ahead.T_world_camera();
+  out.valid = false;
+  out.lost = true;
+  out.T_world_camera = state_.T_world_camera();
   out.features.resize(landmarks_.size());
-  const int dim = layout_.dim;
-  BlockMeasurement m;
-  m.rows = 2;
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     const SlamLandmark& landmark = landmarks_[i];
     SlamFeaturePrediction& feature = out.features[i];
     feature.id = landmark.id;
+    feature.visible = false;
+    feature.placed = is_placed(landmark);
     if (landmark.point.converted) {
       feature.point = landmark.point.position;
       feature.weight = 1;
@@ -257,6 +260,21 @@ void SlamFilter::predict_frame_at(const SlamState& ahead, TimeNs time_ns, SlamPr
       feature.weight = std::max(0.0, p.inverse_depth);
       feature.point = feature.weight * p.anchor + p.ray();
     }
+  }
+}
+
+// With x' = F x + noise of Q: S = (H F) P (H F)^T + H_h Q H_h^T + R, so that P stays as it is.
+void SlamFilter::predict_frame_at(const SlamState& ahead, TimeNs time_ns, SlamPrediction& out) const {
+  predict_lost(time_ns, out);
+  out.valid = true;
+  out.lost = !found_;
+  out.T_world_camera = ahead.T_world_camera();
+  const int dim = layout_.dim;
+  BlockMeasurement m;
+  m.rows = 2;
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    const SlamLandmark& landmark = landmarks_[i];
+    SlamFeaturePrediction& feature = out.features[i];
     const auto pixel = predict(ahead, camera_, landmark.point);
     feature.visible = pixel && camera_.in_image(*pixel, options_.map.border_px);
     if (!feature.visible) continue;
@@ -365,6 +383,9 @@ NamedCounts SlamFilter::counts() const {
           {"slam.converted", total_.converted},
           {"slam.deleted", total_.deleted},
           {"slam.failed_updates", failed_updates_},
+          {"slam.lost", lost_frames_},
+          {"slam.refound", times_refound_},
+          {"slam.gone_on", times_gone_on_},
           {"slam.map", static_cast<std::int64_t>(landmarks_.size())}};
 }
 
@@ -414,7 +435,8 @@ void SlamFilter::restore(const SlamSnapshot& snapshot) {
   landmarks_ = snapshot.landmarks;
   landmarks_.reserve(static_cast<std::size_t>(options_.map.max_features));
   for (SlamLandmark& landmark : landmarks_)
-    landmark.last_measured_frame = -1;  // of another run: older than all of this
+    landmark.last_measured_frame = landmark.first_frame = -1;  // of another run: older than all of this
+  forget_location();
   covariance_.set_dense(snapshot.covariance);
   transition_.reset();
   expected_.clear();

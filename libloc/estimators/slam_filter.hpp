@@ -9,7 +9,11 @@
 //   3. of those matched the most informative ones (largest det S) are taken, up to max_measured
 //   4. 1-point RANSAC finds which of them agree; those update the state together
 //   5. the others are predicted anew: who is within the gate now was right (rescued) and updates it, too
-//   6. features that are well known become XYZ, those that are expected and not found are deleted, new ones are added
+//   6. a frame is found in the map when enough features of it that were there before agree. After lost_after_s of
+//      frames that are not it is lost (kLost): a few that agree by chance then change nothing, and for relocate_s of
+//      frames with something in them nothing is added, while the front end looks for the map. What finds it then says
+//      kRefound once; if nothing does, it goes on in surroundings that are new, with the covariance of its guess.
+//   7. features that are well known become XYZ, those that are expected and not found are deleted, new ones are added
 //      where the picture is empty
 // There is no initialisation phase: a feature counts from the first frame on, its depth is unknown within the prior.
 //
@@ -49,6 +53,7 @@ struct SlamLandmark {
   std::int64_t measured = 0;
   TimeNs last_measured_ns = kNoTime;
   std::int64_t last_measured_frame = -1;  ///< counted by the filter, whatever clocks do
+  std::int64_t first_frame = -1;          ///< the same, when it was added; -1: known before, or of another run
   bool known = false;                     ///< its place was given
   // Of the frame at hand.
   bool visible = false;
@@ -104,6 +109,12 @@ class SlamFilter {
   void predict_frame(TimeNs time_ns, const InertialStep& step, const InertialStepNoise& noise,
                      SlamPrediction& out) const;
 
+  /// The same when it is not known what happened meanwhile: lost, not valid.
+  void predict_lost(TimeNs time_ns, SlamPrediction& out) const;
+  /// No frame for too long, says who knows the time.
+  void lose() { lost_ = lost_ || found_frame_ >= 0; }
+  bool lost() const { return lost_; }
+
   /// The body does not move: v = 0, and with an IMU the mean rate is the gyroscope's bias.
   /// @param rate as measured, bias not removed [rad/s] @returns false when the filter knows better (gate).
   bool zero_velocity(double sigma_velocity, const Eigen::Vector3d& rate, double sigma_rate);
@@ -152,6 +163,10 @@ class SlamFilter {
   Eigen::Vector2d moved_by(const BlockMeasurement& measurement) const;
   void rescue(const FeaturesMeasurement& frame);
   void apply_update();
+  void locate(const FeaturesMeasurement& frame);
+  bool looks_for_map() const;
+  int fewest_to_find() const;
+  void forget_location();
   void judge(const FeaturesMeasurement& frame);
   void report(const FeaturesMeasurement& frame);
 
@@ -165,6 +180,7 @@ class SlamFilter {
   double usual_inverse_depth() const;
   void add_known_landmarks();
 
+  bool is_placed(const SlamLandmark& landmark) const;
   bool sigma_is_usable(double sigma_px) const;
   double sigma_px(const FeaturesMeasurement& frame) const;
 
@@ -210,7 +226,20 @@ class SlamFilter {
   double nis_ = 0;
   double frame_sigma_px_ = kUnknown;
 
+  // Where the last frames were found.
+  bool found_ = true;               // the last one
+  bool lost_ = false;               // none for too long
+  bool refound_ = false;            // by the frame at hand
+  std::int64_t found_frame_ = -1;   // the last one that was; -1: none yet
+  TimeNs found_ns_ = kNoTime;       // its time
+  TimeNs last_frame_ns_ = kNoTime;  // of any frame
+  double strange_s_ = 0;            // for so long frames have shown something else
+  double usually_found_ = 0;        // features
+
   std::int64_t frames_ = 0;
+  std::int64_t lost_frames_ = 0;
+  std::int64_t times_refound_ = 0;
+  std::int64_t times_gone_on_ = 0;
   std::int64_t ambiguous_ = 0;
   std::int64_t not_usable_ = 0;
   std::int64_t sigma_not_usable_ = 0;

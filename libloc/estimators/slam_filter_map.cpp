@@ -125,7 +125,7 @@ bool SlamFilter::add_landmark(const FeatureObservation& observation, double inve
   landmark.offset = covariance_.append(birth->head_jacobian.leftCols(layout_.dim), birth->noise_cov);
   landmark.tries = landmark.hits = 1;
   landmark.last_measured_ns = time_ns_;
-  landmark.last_measured_frame = frames_;
+  landmark.last_measured_frame = landmark.first_frame = frames_;
   landmark.visible = true;
   landmark.state = SlamFeatureState::kNew;
   landmark.predicted_px = observation.pixel_px;

@@ -17,6 +17,10 @@ constexpr double kLeastSigmaPx = 1e-3;   // what no tracker does better
 constexpr double kFarthest = 27.9;       // chi-square of 6, 0.9999
 constexpr double kAbsurdPx = 1e4;        // a residual without meaning: the point is in the plane of the camera
 constexpr double kNarrowSigmas = 3;      // of a pixel's own deviation
+constexpr int kFewestFound = 3;          // features that hold a pose
+constexpr int kFewestRefound = 8;        // and that do not agree by chance
+constexpr double kFoundPart = 0.2;       // of those that are usually found
+constexpr double kUsualPart = 0.1;       // of a frame in what is usual
 
 double square(double x) {
   return x * x;
@@ -149,6 +153,13 @@ Eigen::Matrix2d SlamFilter::product_cov(const SlamLandmark& landmark, const Eige
   return covariance_(rho, rho) * (by_way * way * by_way.transpose());
 }
 
+bool SlamFilter::is_placed(const SlamLandmark& landmark) const {
+  if (landmark.point.converted) return true;
+  const int at = landmark.offset + kInverseDepth;
+  const double rho = landmark.point.inverse_depth.inverse_depth;
+  return std::sqrt(std::max(0.0, covariance_(at, at))) < kKnownDepthPart * rho;
+}
+
 // After a while without features the prior is so wide that Jacobians at it mean nothing. The pose that explains most
 // pixels with the map as it is tells where to take them; the prior itself stays what it was: r = z - h(x_1) +
 // H_1 (x_1 - x_0). dx_ is x_1 - x_0 then.
@@ -182,15 +193,9 @@ bool SlamFilter::approach(const FeaturesMeasurement& frame, SlamState& near) {
     if (landmark.observation < 0) continue;
     const auto ray = camera_.unproject(frame.features[static_cast<std::size_t>(landmark.observation)].pixel_px);
     if (!ray) continue;
-    if (landmark.point.converted) {
-      sighted_.push_back({landmark.point.position, *ray});
-      continue;
-    }
-    const int at = landmark.offset + kInverseDepth;
-    const double rho = landmark.point.inverse_depth.inverse_depth;
-    if (std::sqrt(std::max(0.0, covariance_(at, at))) < kKnownDepthPart * rho) {
-      sighted_.push_back({landmark.point.inverse_depth.xyz(), *ray});
-    }
+    if (!is_placed(landmark)) continue;
+    const SlamPoint& point = landmark.point;
+    sighted_.push_back({point.converted ? point.position : point.inverse_depth.xyz(), *ray});
   }
   if (sighted_.size() < kFewestForPose) return false;
   AbsolutePoseOptions narrowing;
@@ -330,6 +335,14 @@ void SlamFilter::update_agreeing(const FeaturesMeasurement& frame) {
   if (which_.empty()) return;
   innovate();
   const std::vector<char>& agrees = agreeing(sigma_px(frame));
+  const auto agreeing_count =
+      std::count(agrees.begin(), agrees.begin() + static_cast<std::ptrdiff_t>(which_.size()), 1);
+  if (looks_for_map() && agreeing_count < fewest_to_find()) {
+    // A few may agree by chance, and always do where the prior says nothing.
+    for (const int i : which_) landmarks_[static_cast<std::size_t>(i)].state = SlamFeatureState::kRejected;
+    candidates_.clear();
+    return;
+  }
   for (std::size_t k = 0; k < which_.size(); ++k) {
     SlamLandmark& landmark = landmarks_[static_cast<std::size_t>(which_[k])];
     landmark.state = agrees[k] != 0 ? SlamFeatureState::kMeasured : SlamFeatureState::kRejected;
@@ -445,6 +458,63 @@ void SlamFilter::rescue(const FeaturesMeasurement& frame) {
   apply_update();
 }
 
+// While the map is looked for nothing joins it.
+bool SlamFilter::looks_for_map() const {
+  return found_frame_ >= 0 && strange_s_ < options_.relocate_s;
+}
+
+// As many as hardly agree by chance; fewer where there never are many.
+int SlamFilter::fewest_to_find() const {
+  return std::clamp(static_cast<int>(kFoundPart * usually_found_), kFewestFound, kFewestRefound);
+}
+
+void SlamFilter::forget_location() {
+  found_ = true;
+  lost_ = refound_ = false;
+  found_frame_ = -1;
+  found_ns_ = last_frame_ns_ = kNoTime;
+  strange_s_ = usually_found_ = 0;
+}
+
+// Is the frame one of this map?
+void SlamFilter::locate(const FeaturesMeasurement& frame) {
+  int old = 0;  // that were there when the last frame was found
+  int young = 0;
+  int old_rejected = 0;
+  for (const SlamLandmark& landmark : landmarks_) {
+    const bool measured = landmark.state == SlamFeatureState::kMeasured || landmark.state == SlamFeatureState::kRescued;
+    const bool is_old = landmark.first_frame <= found_frame_;
+    if (is_old && landmark.observation >= 0 && landmark.state == SlamFeatureState::kRejected) ++old_rejected;
+    if (measured) ++(is_old ? old : young);
+  }
+  refound_ = false;
+  const double since = last_frame_ns_ == kNoTime ? 0 : std::max(0.0, to_seconds(time_ns_ - last_frame_ns_));
+  last_frame_ns_ = time_ns_;
+  if (found_ns_ == kNoTime || found_ns_ > time_ns_) found_ns_ = time_ns_;  // the beginning; a clock that was set back
+  const bool began = found_frame_ >= 0;
+  const bool by_old = old >= fewest_to_find() && !(lost_ && old_rejected > old);
+  // What came while nothing was found: surroundings that are new.
+  const bool by_all = old + young >= kFewestFound && !looks_for_map();
+  found_ = by_old || by_all || !began;
+  if (by_old || by_all) {
+    refound_ = lost_ && by_old;
+    if (refound_) ++times_refound_;
+    if (lost_ && !by_old) ++times_gone_on_;
+    lost_ = false;
+    found_frame_ = frames_;
+    found_ns_ = time_ns_;
+    strange_s_ = 0;
+    usually_found_ += kUsualPart * (old + young - usually_found_);
+    return;
+  }
+  if (!began) return;
+  if (static_cast<int>(frame.features.size()) >= kFewestRefound) {
+    strange_s_ += std::min(since, options_.lost_after_s);  // what a pause hid was not seen
+  }
+  lost_ = lost_ || to_seconds(time_ns_ - found_ns_) > options_.lost_after_s;
+  if (lost_) ++lost_frames_;
+}
+
 // Who was measured, and who should have been.
 void SlamFilter::judge(const FeaturesMeasurement& frame) {
   double before = 0;
@@ -453,7 +523,7 @@ void SlamFilter::judge(const FeaturesMeasurement& frame) {
   const double forget = 1 - 1.0 / (2 * options_.map.delete_after_tries);
   SlamCounts& counts = frame_.counts;
   // A frame in which nothing was found says something of the frame, not of the features.
-  const bool any = frame_.nis_dim > 0;
+  const bool any = frame_.nis_dim > 0 && found_;
   for (SlamLandmark& landmark : landmarks_) {
     const bool measured = landmark.state == SlamFeatureState::kMeasured || landmark.state == SlamFeatureState::kRescued;
     if (landmark.visible) ++counts.visible;

@@ -106,6 +106,7 @@ void SlamOptions::check() const {
   require_positive("max_angular_velocity", max_angular_velocity);
   require_positive("max_specific_force", max_specific_force);
   require_positive("lost_after_s", lost_after_s);
+  require(relocate_s >= 0, "relocate_s", relocate_s, "must not be negative");
   map.check();
   association.check();
   require(landmarks.size() <= static_cast<std::size_t>(map.max_features),

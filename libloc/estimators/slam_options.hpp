@@ -156,7 +156,11 @@ struct SlamOptions {
   double max_specific_force = 500;          ///< The same. [m/s^2]
   /// So many frames in a row of which most is not believed: the motion is taken for unknown (kRecovered).
   int recover_after = 10;
-  double lost_after_s = 0.5;  ///< without a frame of enough features: estimates say so (kFewFeatures) [s]
+  /// Without a frame that is found in the map: estimates say so (kLost; with an IMU kFewFeatures, too) [s]
+  double lost_after_s = 0.5;
+  /// For so long of frames that show something, but not the map, nothing is added to it: for front ends that look for
+  /// it. 0: the next frame is one of new surroundings [s]
+  double relocate_s = 0;
 
   /// @throws std::invalid_argument naming the field and its value.
   void check() const;

@@ -168,6 +168,7 @@ void visit_fields(Visitor& v, Options& o) requires std::is_same_v<std::remove_co
   v.field("max_specific_force", o.max_specific_force);
   v.field("recover_after", o.recover_after);
   v.field("lost_after_s", o.lost_after_s);
+  v.field("relocate_s", o.relocate_s);
 }
 
 class Reader {

@@ -15,9 +15,11 @@
 
 #include "libloc/core/check.hpp"
 #include "libloc/estimators/picture_rest.hpp"
+#include "libloc/geometry/absolute_pose.hpp"
 #include "libloc/geometry/camera.hpp"
 #include "libloc/vision/corner_detector.hpp"
 #include "libloc/vision/image_view.hpp"
+#include "libloc/vision/map_search.hpp"
 #include "libloc/vision/patch.hpp"
 
 namespace loc {
@@ -41,6 +43,10 @@ constexpr double kMostSigmaPx = 30;    // of a standing picture; more says nothi
 constexpr int kRemembered = 200;       // pictures in which nobody expects what is not seen
 constexpr double kMostPlaces = 20000;  // at which lost features are looked for in one picture: some 2 ms
 constexpr double kBorder = kPatchHalf + 2;
+constexpr double kGuidedPx = 4;             // deviation of a place by a pose that was found anew [px]
+constexpr double kFittingPx = 3;            // a feature that is where that pose says [px]
+constexpr std::size_t kFewestFitting = 10;  // for such a pose to be believed
+constexpr double kFittingPart = 0.6;        // of what looks right
 
 double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
@@ -128,7 +134,8 @@ struct FeatureTracker::Work {
   Work(const CameraCalibration& calibration, const FeatureTrackerOptions& given)
       : camera(calibration),
         options((given.check(), given)),
-        rest(calibration.intrinsics_px.tail<2>(), kStillPx, kStillTime) {
+        rest(calibration.intrinsics_px.tail<2>(), kStillPx, kStillTime),
+        map_search(camera) {
     require(calibration.width_px >= 64 && calibration.height_px >= 64,
             "camera: the picture is less than 64 pixels wide or high");
     // Half as many cells again as there are tracks: some have no corner.
@@ -168,6 +175,11 @@ struct FeatureTracker::Work {
   std::vector<TrackedFeature> tracked;
   FeatureTrackerTimes times;
   std::vector<Avoided> avoided;
+  MapSearch map_search;
+  std::int64_t map_searches = 0;
+  std::int64_t maps_found = 0;
+  // Camera in the filter's world, where it is known; the warps of what is cut out now begin there.
+  std::optional<Pose3> T_world_camera;
   // Room for one picture's work.
   std::vector<std::size_t> klt;
   std::vector<cv::Point2f> klt_from;
@@ -177,6 +189,15 @@ struct FeatureTracker::Work {
   std::vector<Eigen::Vector2d> taken;
   std::vector<Corner> corners;
   std::unordered_map<std::int64_t, const SlamFeaturePrediction*> by_id;
+  std::vector<MapPatch> map_patches;
+  std::vector<SightedPoint> sighted;
+  struct Place {
+    std::size_t track;
+    PatchMatch match;
+    bool fits = false;
+  };
+  std::vector<Place> found_places;
+  cv::Mat half;
   std::int64_t searched = 0;
   std::int64_t tracked_klt = 0;
   std::int64_t cut_anew = 0;
@@ -193,18 +214,21 @@ struct FeatureTracker::Work {
   }
 
   void take_picture(const ImageMeasurement& image);
-  void take_prediction(const SlamPrediction* expected);
-  Eigen::Matrix2d warp_of(const Track& track, const SlamPrediction* expected) const;
+  void take_prediction(const SlamPrediction* expected, const SlamPrediction* map);
+  Eigen::Matrix2d warp_of(const Track& track, const Pose3* now) const;
   bool search(Track& track, const SlamPrediction* expected);
   Eigen::Vector2d guess_of(const Track& track, const SlamPrediction* expected) const;
   void run_klt(const SlamPrediction* expected);
   void confirm(Track& track, const Eigen::Vector2d& place, const SlamPrediction* expected);
-  bool cut(Track& track, const Eigen::Vector2d& place, const SlamPrediction* expected) const;
+  bool cut(Track& track, const Eigen::Vector2d& place) const;
+  std::optional<Pose3> pose_of_found(const Pose3& start);
+  void find_in_map(const SlamPrediction& map);
+  bool confirm_pose(const Pose3& pose);
   void remove_twins();
   double places_of(const SlamFeaturePrediction& there) const;
   bool is_blind() const;
   void forget_picture();
-  void detect(const SlamPrediction* expected);
+  void detect();
   void out_without(const ImageMeasurement& image);
   void give_out(const ImageMeasurement& image);
 };
@@ -240,15 +264,18 @@ void FeatureTracker::Work::take_picture(const ImageMeasurement& image) {
   ++pictures;
 }
 
-void FeatureTracker::Work::take_prediction(const SlamPrediction* expected) {
+// @param map expected, or what is left of it where the estimator is lost
+void FeatureTracker::Work::take_prediction(const SlamPrediction* expected, const SlamPrediction* map) {
   by_id.clear();
-  if (expected != nullptr) {
-    for (const SlamFeaturePrediction& feature : expected->features) by_id.emplace(feature.id, &feature);
+  if (map != nullptr) {
+    for (const SlamFeaturePrediction& feature : map->features) by_id.emplace(feature.id, &feature);
   }
+  T_world_camera.reset();
+  if (expected != nullptr && !expected->lost) T_world_camera = expected->T_world_camera;
   for (Track& track : tracks) {
     const auto found = by_id.find(track.id);
     track.expected = found == by_id.end() ? nullptr : found->second;
-    if (expected != nullptr) track.in_map = track.expected != nullptr;
+    if (map != nullptr) track.in_map = track.expected != nullptr;
     track.last_px = track.pixel_px;
     track.unseen = track.seen ? 0 : track.unseen + 1;
     track.was_seen = track.seen;
@@ -257,21 +284,21 @@ void FeatureTracker::Work::take_prediction(const SlamPrediction* expected) {
   }
   // What is neither seen nor in the map will not come back, nor what nobody expects for long.
   std::erase_if(tracks, [&](const Track& track) {
-    return !track.was_seen && (!track.in_map || (expected == nullptr && track.unseen > kRemembered));
+    return !track.was_seen && (!track.in_map || (map == nullptr && track.unseen > kRemembered));
   });
 }
 
 // How offsets around the feature where its patch was cut come to offsets around it now: the surface is taken to face
 // the camera that saw it first. Without poses: as it was.
-Eigen::Matrix2d FeatureTracker::Work::warp_of(const Track& track, const SlamPrediction* expected) const {
+Eigen::Matrix2d FeatureTracker::Work::warp_of(const Track& track, const Pose3* now) const {
   Eigen::Matrix2d same = Eigen::Matrix2d::Identity();
-  if (expected == nullptr || !expected->valid || track.expected == nullptr || !track.anchor.has_pose) return same;
+  if (now == nullptr || track.expected == nullptr || !track.anchor.has_pose) return same;
   const Pose3& then = track.anchor.T_world_camera;
   const Eigen::Vector3d way = track.expected->point - track.expected->weight * then.translation;
   const double distance = way.norm();
   if (!(distance > 0)) return same;
   const Eigen::Vector3d normal = way / distance;
-  const Pose3 T_camera_world = expected->T_world_camera.inverse();
+  const Pose3 T_camera_world = now->inverse();
   const auto now_of = [&](double dx, double dy) -> std::optional<Eigen::Vector2d> {
     const auto ray = camera.unproject(track.anchor.pixel_px + Eigen::Vector2d(dx, dy));
     if (!ray) return std::nullopt;
@@ -291,17 +318,17 @@ Eigen::Matrix2d FeatureTracker::Work::warp_of(const Track& track, const SlamPred
   return warp;
 }
 
-bool FeatureTracker::Work::cut(Track& track, const Eigen::Vector2d& place, const SlamPrediction* expected) const {
+bool FeatureTracker::Work::cut(Track& track, const Eigen::Vector2d& place) const {
   track.anchor.pixel_px = place;
-  track.anchor.has_pose = expected != nullptr && expected->valid;
-  if (track.anchor.has_pose) track.anchor.T_world_camera = expected->T_world_camera;
+  track.anchor.has_pose = T_world_camera.has_value();
+  if (track.anchor.has_pose) track.anchor.T_world_camera = *T_world_camera;
   return track.patch.cut(view(), place);
 }
 
 // Within the ellipse of the prediction.
 bool FeatureTracker::Work::search(Track& track, const SlamPrediction* expected) {
   WarpedPatch patch;
-  if (!track.patch.warp(warp_of(track, expected), patch)) return false;
+  if (!track.patch.warp(warp_of(track, &expected->T_world_camera), patch)) return false;
   const SlamFeaturePrediction& there = *track.expected;
   const int farthest = static_cast<int>(std::ceil(options.search_sigmas * options.max_search_px));
   const PatchMatch coarse =
@@ -316,7 +343,7 @@ bool FeatureTracker::Work::search(Track& track, const SlamPrediction* expected) 
   track.seen = true;
   track.origin = track.was_seen ? TrackOrigin::kSearched : TrackOrigin::kRefound;
   // From before the filter began: with a pose, warps are known from here on.
-  if (!track.anchor.has_pose) cut(track, track.pixel_px, expected);
+  if (!track.anchor.has_pose) cut(track, track.pixel_px);
   return true;
 }
 
@@ -341,7 +368,7 @@ Eigen::Vector2d FeatureTracker::Work::guess_of(const Track& track, const SlamPre
 // A place where Lucas-Kanade arrived: does it look like the feature?
 void FeatureTracker::Work::confirm(Track& track, const Eigen::Vector2d& place, const SlamPrediction* expected) {
   WarpedPatch patch;
-  const Eigen::Matrix2d warp = warp_of(track, expected);
+  const Eigen::Matrix2d warp = warp_of(track, expected == nullptr ? nullptr : &expected->T_world_camera);
   const double stretch = warp.norm() / std::sqrt(2.0);
   const bool usual = stretch < options.max_warp && stretch > 1 / options.max_warp;
   if (usual && track.patch.warp(warp, patch)) {
@@ -352,7 +379,7 @@ void FeatureTracker::Work::confirm(Track& track, const Eigen::Vector2d& place, c
       track.seen = true;
       track.origin = TrackOrigin::kTracked;
       // From before the filter began: with a pose, warps are known from here on.
-      if (!track.anchor.has_pose && track.expected != nullptr) cut(track, track.pixel_px, expected);
+      if (!track.anchor.has_pose && track.expected != nullptr) cut(track, track.pixel_px);
       return;
     }
   }
@@ -362,7 +389,7 @@ void FeatureTracker::Work::confirm(Track& track, const Eigen::Vector2d& place, c
   const PatchMatch fine = align_patch(patch, view(), place, kFarthestAlign);
   if (!fine.found || fine.correlation < options.min_correlation || (fine.pixel_px - place).norm() > kKltDisagrees)
     return;
-  if (!cut(track, fine.pixel_px, expected)) return;
+  if (!cut(track, fine.pixel_px)) return;
   track.pixel_px = fine.pixel_px;
   track.correlation = fine.correlation;
   track.seen = true;
@@ -390,6 +417,100 @@ void FeatureTracker::Work::run_klt(const SlamPrediction* expected) {
   }
 }
 
+// By what is seen of the map. nullopt when it does not fit together.
+std::optional<Pose3> FeatureTracker::Work::pose_of_found(const Pose3& start) {
+  sighted.clear();
+  for (const Track& track : tracks) {
+    if (!track.seen || track.expected == nullptr || !track.expected->placed) continue;
+    const auto ray = camera.unproject(track.pixel_px);
+    if (ray) sighted.push_back({track.expected->point / track.expected->weight, *ray});
+  }
+  if (sighted.size() < kFewestFitting) return std::nullopt;
+  AbsolutePoseOptions narrowing;
+  narrowing.last_width = 0.5 * kFittingPx / camera.intrinsics_px().head<2>().minCoeff();
+  narrowing.min_fitting = kFittingPart;
+  return absolute_pose(sighted, start, narrowing);
+}
+
+// The features where that pose says: enough of them, and these are the ones that are seen.
+bool FeatureTracker::Work::confirm_pose(const Pose3& pose) {
+  const Pose3 T_camera_world = pose.inverse();
+  found_places.clear();
+  const int farthest = static_cast<int>(std::ceil(options.search_sigmas * kGuidedPx));
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    const Track& track = tracks[i];
+    if (track.expected == nullptr) continue;
+    const auto there = camera.project(T_camera_world.rotation * track.expected->point +
+                                      track.expected->weight * T_camera_world.translation);
+    WarpedPatch patch;
+    if (!there || !camera.in_image(*there, kBorder) || !track.patch.warp(warp_of(track, &pose), patch)) continue;
+    const PatchMatch coarse = search_patch(patch, view(), *there, kGuidedPx * kGuidedPx * Eigen::Matrix2d::Identity(),
+                                           options.search_sigmas, farthest);
+    if (!coarse.found || coarse.correlation < 0.6 * options.min_refind_correlation) continue;
+    const PatchMatch fine = align_patch(patch, view(), coarse.pixel_px, kFarthestAlign);
+    if (fine.found && fine.correlation >= options.min_refind_correlation)
+      found_places.push_back({.track = i, .match = fine});
+  }
+  sighted.clear();
+  for (const Place& place : found_places) {
+    const SlamFeaturePrediction& feature = *tracks[place.track].expected;
+    const auto ray = camera.unproject(place.match.pixel_px);
+    if (ray && feature.placed) sighted.push_back({feature.point / feature.weight, *ray});
+  }
+  if (sighted.size() < kFewestFitting) return false;
+  const double focal_px = camera.intrinsics_px().head<2>().minCoeff();
+  AbsolutePoseOptions narrowing;
+  narrowing.first_width = 2 * options.search_sigmas * kGuidedPx / focal_px;
+  narrowing.last_width = 0.5 * kFittingPx / focal_px;
+  narrowing.min_fitting = kFittingPart;
+  const auto better = absolute_pose(sighted, pose, narrowing);
+  if (!better) return false;
+  const Pose3 to_camera = better->inverse();
+  std::size_t fitting = 0;
+  for (Place& place : found_places) {
+    const SlamFeaturePrediction& feature = *tracks[place.track].expected;
+    const auto there = camera.project(to_camera.rotation * feature.point + feature.weight * to_camera.translation);
+    place.fits = there && (*there - place.match.pixel_px).norm() < kFittingPx;
+    fitting += place.fits && feature.placed ? 1 : 0;
+  }
+  if (fitting < kFewestFitting) return false;
+  for (Track& track : tracks) {
+    if (track.in_map) track.seen = false;
+  }
+  for (const Place& place : found_places) {
+    if (!place.fits) continue;
+    Track& track = tracks[place.track];
+    track.seen = true;
+    track.pixel_px = place.match.pixel_px;
+    track.correlation = place.match.correlation;
+    track.origin = TrackOrigin::kRefound;
+  }
+  T_world_camera = *better;
+  return true;
+}
+
+// The estimator is lost: in all of the picture, unless the tracks that are left agree on a pose.
+void FeatureTracker::Work::find_in_map(const SlamPrediction& map) {
+  ++map_searches;
+  auto pose = pose_of_found(map.T_world_camera);
+  if (!pose || !confirm_pose(*pose)) {
+    map_patches.clear();
+    for (const Track& track : tracks) {
+      if (track.expected == nullptr || !track.expected->placed) continue;
+      map_patches.push_back({&track.patch, track.expected->point / track.expected->weight});
+    }
+    if (pyramid.size() > 2) {
+      half = pyramid[2];  // every second one is of derivatives
+    } else {
+      cv::pyrDown(gray, half);
+    }
+    const GrayView half_view{half.data, half.cols, half.rows, static_cast<int>(half.step)};
+    pose = map_search.find(view(), half_view, map_patches, map.T_world_camera, map_searches);
+    if (!pose || !confirm_pose(*pose)) return;
+  }
+  ++maps_found;
+}
+
 // Two tracks on one feature: the older one stays.
 void FeatureTracker::Work::remove_twins() {
   for (std::size_t i = 0; i < tracks.size(); ++i) {
@@ -403,7 +524,7 @@ void FeatureTracker::Work::remove_twins() {
   }
 }
 
-void FeatureTracker::Work::detect(const SlamPrediction* expected) {
+void FeatureTracker::Work::detect() {
   taken.clear();
   for (const Track& track : tracks) {
     if (track.seen) taken.push_back(track.pixel_px);
@@ -421,7 +542,7 @@ void FeatureTracker::Work::detect(const SlamPrediction* expected) {
     track.last_px = corner.pixel_px;
     track.seen = true;
     WarpedPatch patch;
-    if (!cut(track, corner.pixel_px, expected) || !track.patch.warp(Eigen::Matrix2d::Identity(), patch)) continue;
+    if (!cut(track, corner.pixel_px) || !track.patch.warp(Eigen::Matrix2d::Identity(), patch)) continue;
     track.id = next_id++;
     ++added;
     tracks.push_back(track);
@@ -492,12 +613,13 @@ FeatureTracker::~FeatureTracker() = default;
 const FeaturesMeasurement& FeatureTracker::track(const ImageMeasurement& image, const SlamPrediction* expected) {
   Work& w = *work_;
   const auto begin = Clock::now();
+  const SlamPrediction* const map = expected != nullptr && (expected->valid || expected->lost) ? expected : nullptr;
   if (expected != nullptr && !expected->valid) expected = nullptr;
   w.take_picture(image);
   w.times.pyramid_s = seconds_since(begin);
 
   const auto search_begin = Clock::now();
-  w.take_prediction(expected);
+  w.take_prediction(expected, map);
   w.klt.clear();
   double places = 0;
   for (std::size_t k = 0; k < w.tracks.size(); ++k) {
@@ -519,11 +641,12 @@ const FeaturesMeasurement& FeatureTracker::track(const ImageMeasurement& image, 
 
   const auto klt_begin = Clock::now();
   w.run_klt(expected);
+  if (map != nullptr && map->lost) w.find_in_map(*map);
   w.times.klt_s = seconds_since(klt_begin);
 
   const auto detect_begin = Clock::now();
   w.remove_twins();
-  w.detect(expected);
+  w.detect();
   w.times.detect_s = seconds_since(detect_begin);
 
   if (w.is_blind()) {
@@ -531,8 +654,8 @@ const FeaturesMeasurement& FeatureTracker::track(const ImageMeasurement& image, 
     w.forget_picture();
   } else {
     w.give_out(image);
-    w.has_before_pose = expected != nullptr;
-    if (expected != nullptr) w.T_world_before = expected->T_world_camera;
+    w.has_before_pose = w.T_world_camera.has_value();
+    if (w.has_before_pose) w.T_world_before = *w.T_world_camera;
   }
   w.times.total_s = seconds_since(begin);
   return w.out;
@@ -580,11 +703,12 @@ const FeatureTrackerOptions& FeatureTracker::options() const {
 
 NamedCounts FeatureTracker::counts() const {
   const Work& w = *work_;
-  return {{"pictures", w.pictures},        {"pictures.exposure_steps", w.exposure_steps},
-          {"pictures.blind", w.blind},     {"tracks.new", w.added},
-          {"tracks.searched", w.searched}, {"tracks.klt", w.tracked_klt},
-          {"tracks.cut_anew", w.cut_anew}, {"tracks.refound", w.refound},
-          {"tracks.lost", w.lost},         {"tracks.moving", w.moving}};
+  return {{"pictures", w.pictures},         {"pictures.exposure_steps", w.exposure_steps},
+          {"pictures.blind", w.blind},      {"tracks.new", w.added},
+          {"tracks.searched", w.searched},  {"tracks.klt", w.tracked_klt},
+          {"tracks.cut_anew", w.cut_anew},  {"tracks.refound", w.refound},
+          {"tracks.lost", w.lost},          {"tracks.moving", w.moving},
+          {"map.searched", w.map_searches}, {"map.found", w.maps_found}};
 }
 
 }  // namespace loc

@@ -9,7 +9,9 @@
 //      then placed by the patch as in 1, so that a feature does not creep away from what it was. A patch that no longer
 //      looks like the feature is cut anew where the feature is now.
 //   3. features of the map that were lost or come back into view: as 1, with a stricter correlation
-//   4. corners in cells of the picture that have none (FAST, then the smaller eigenvalue of Shi and Tomasi)
+//   4. where the estimator is lost: the map in all of the picture (map_search.hpp), then each feature of it where that
+//      pose says; all of it counts as seen that fits together, and nothing when too little does
+//   5. corners in cells of the picture that have none (FAST, then the smaller eigenvalue of Shi and Tomasi)
 // A picture in which nothing is found, neither tracks nor corners, counts as one that did not come: the next one goes
 // on from the picture before it. What the filter rejects several times in a row is taken for something that moves by
 // itself: its track ends, and for a while no new one begins there. A change of exposure is taken out before 2; 1 and 3
@@ -103,7 +105,8 @@ class FeatureTracker {
   const std::vector<TrackedFeature>& last() const;
   const FeatureTrackerTimes& times() const;
   /// "tracks.searched", "tracks.klt", "tracks.cut_anew", "tracks.refound", "tracks.new", "tracks.lost",
-  /// "tracks.moving", "pictures", "pictures.exposure_steps", "pictures.blind" (nothing in them).
+  /// "tracks.moving", "map.searched" (pictures in which the map was looked for everywhere), "map.found", "pictures",
+  /// "pictures.exposure_steps", "pictures.blind" (nothing in them).
   NamedCounts counts() const;
   const FeatureTrackerOptions& options() const;
 

@@ -46,6 +46,12 @@ class ImagePatch {
   /// @returns false, and holds nothing, for a place so near to the border that not even the patch itself fits.
   bool cut(const GrayView& image, const Eigen::Vector2d& pixel_px);
   bool empty() const { return half_ == 0; }
+  /// What was cut, of 2 half + 1 pixels each way. @param middle_px is set to where the feature is in it
+  GrayView view(Eigen::Vector2d& middle_px) const {
+    const std::size_t first = static_cast<std::size_t>((kHalf - half_) * (kSize + 1));
+    middle_px = offset_.array() + half_;
+    return {&pixels_[first], 2 * half_ + 1, 2 * half_ + 1, kSize};
+  }
 
   /// @param warp from offsets in the picture where it was cut to offsets in the one where it is looked for
   /// @returns false for a warp that reaches beyond what was cut, or is (nearly) singular, or for a patch without

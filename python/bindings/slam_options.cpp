@@ -254,8 +254,12 @@ void bind_slam_options_struct(py::module_& m) {
       .def_readwrite("max_specific_force", &O::max_specific_force, "A sample with more is skipped [m/s^2].")
       .def_readwrite("recover_after", &O::recover_after,
                      "Frames in a row of which most is not believed: the motion is taken for unknown (RECOVERED).")
-      .def_readwrite("lost_after_s", &O::lost_after_s,
-                     "Without a frame of enough features: estimates say so (FEW_FEATURES) [s].")
+      .def_readwrite(
+          "lost_after_s", &O::lost_after_s,
+          "Without a frame that is found in the map: estimates say so (LOST; with an IMU FEW_FEATURES, too) [s].")
+      .def_readwrite("relocate_s", &O::relocate_s,
+                     "For so long of frames that show something, but not the map, nothing is added to it: for front "
+                     "ends that look for it. 0: the next frame is one of new surroundings [s].")
       .def("check", &O::check, "ValueError names a field that is out of range.");
 }
 

@@ -1,13 +1,18 @@
 // Hard cases for SLAM from pictures, rendered with truth: a box room in which a camera sways, and a street along which
 // it drives. Camera alone (errors after Sim(3)) and with a simulated IMU (white noise and biases; after SE(3)).
-//   compare_images [small]     pictures of 752 x 480, or half as many pixels each way
-// Columns: ATE; largest error; that of the last second and a half; pictures with too few features, pictures after which
-// the filter took the motion for unknown or began anew; tracks found out as moving, and found again.
-// All is seeded; the figures are those of one run of each.
+//   compare_images [OPTIONS]
+//     --small          half as many pixels each way as 752 x 480
+//     --seeds=N        so many worlds and noises, a line each (default 1)
+//     --only=TEXT      only lines with that in "world: case: who", such as "street", "black", "alone"
+// Columns: ATE, of the pictures after which it was not lost (aligned by them); their largest error; that of the last
+// second and a half; the largest error while it was lost, by what it said itself to be off (deviation of the place);
+// pictures after which it was lost, and times that it found itself again; pictures with too few features, pictures
+// after which the filter took the motion for unknown or began anew; tracks found out as moving, and found again; mean
+// time of a picture, and the longest.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -48,7 +53,7 @@ struct Pause {
 using Change = std::function<std::optional<ImageMeasurement>(double time_s, const ImageMeasurement& image)>;
 
 struct Case {
-  const char* name;
+  std::string name;
   std::vector<Pause> pauses{};
   double turn = 0;  ///< in the middle of the pause, there and back [rad]
   Change change = [](double, const ImageMeasurement& image) { return std::optional(image); };
@@ -74,7 +79,7 @@ ImageMeasurement with_crowd(double t, const ImageMeasurement& image) {
 
 std::vector<Case> cases() {
   const auto between = [](double t, double begin, double end) { return t >= begin && t < end; };
-  return {{"plain"},
+  return {{.name = "plain"},
           {.name = "pure rotation, 2 s", .pauses = {{3, 5}}, .turn = 0.5},
           {.name = "stop and go", .pauses = {{2.5, 4}, {5.5, 6.5}}},
           {.name = "crowd on 40 %, 3 s",
@@ -100,8 +105,21 @@ std::vector<Case> cases() {
                [=](double t, const ImageMeasurement& i) {
                  return std::optional(between(t, 4, 4.5) ? test::brightened(i, 0) : i);
                }},
-          {.name = "black for 2 s", .change = [=](double t, const ImageMeasurement& i) {
-             return std::optional(between(t, 4, 6) ? test::brightened(i, 0) : i);
+          {.name = "black for 2 s",
+           .change =
+               [=](double t, const ImageMeasurement& i) {
+                 return std::optional(between(t, 4, 6) ? test::brightened(i, 0) : i);
+               }},
+          {.name = "no pictures for 2 s",
+           .change = [=](double t,
+                         const ImageMeasurement& i) { return between(t, 4, 6) ? std::nullopt : std::optional(i); }},
+          {.name = "wall before it for 1.5 s", .change = [=](double t, const ImageMeasurement& i) {
+             const auto wall = [&] {
+               return test::covered(
+                   i,
+                   {.left = -80 * (t - 4), .top = 0, .width = 2 * i.width_px, .height = i.height_px + 8, .pattern = 5});
+             };
+             return std::optional(between(t, 4, 5.5) ? wall() : i);
            }}};
 }
 
@@ -134,6 +152,9 @@ Pose3 pose_of(const World& world, const Case& c, double t) {
 struct Run {
   Trajectory estimate;
   std::vector<std::uint32_t> status;
+  std::vector<double> sigma_m;
+  double spent_s = 0;
+  double longest_s = 0;
   NamedCounts counts;
 };
 
@@ -141,6 +162,17 @@ void keep(const SlamFrame& frame, Run& run) {
   run.estimate.times_ns.push_back(frame.time_ns);
   run.estimate.poses.push_back({frame.q_world_camera, frame.camera_position});
   run.status.push_back(frame.estimate.status);
+  run.sigma_m.push_back(std::sqrt(frame.estimate.covariance.block<3, 3>(kPosition, kPosition).trace()));
+}
+
+template <class Slam>
+bool process(ImageSlam<Slam>& slam, const ImageMeasurement& image, Run& run) {
+  const auto begin = std::chrono::steady_clock::now();
+  const bool is_new = slam.process(image);
+  const double spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  run.spent_s += spent;
+  run.longest_s = std::max(run.longest_s, spent);
+  return is_new;
 }
 
 SlamOptions slam_options(const CameraCalibration& camera, SlamMotion motion) {
@@ -155,21 +187,20 @@ Run run_alone(const std::vector<ImageMeasurement>& images, const CameraCalibrati
   ImageSlam<MonoSlam> slam(slam_options(camera, SlamMotion::kConstantVelocity));
   Run out;
   for (const ImageMeasurement& image : images) {
-    if (slam.process(image)) keep(slam.slam().frame(), out);
+    if (process(slam, image, out)) keep(slam.slam().frame(), out);
   }
   out.counts = slam.counts();
   return out;
 }
 
 Run run_inertial(const std::vector<ImageMeasurement>& images, const CameraCalibration& camera,
-                 const std::function<Pose3(double)>& path) {
+                 const std::function<Pose3(double)>& path, std::uint64_t seed) {
   ImageSlam<InertialSlam> slam(slam_options(camera, SlamMotion::kInertial));
   Run out;
-  Random random(3);
+  Random random(seed + 2);
   const DiscreteImuNoise noise = discretise(ImuNoise{}, 1 / kImuHz);
   std::size_t next = 0;
-  const auto process = [&](const Measurement& measurement) {
-    slam.process(measurement);
+  const auto keep_frames = [&] {
     for (const SlamFrame& frame : slam.slam().frames()) keep(frame, out);
   };
   for (int i = 0; i <= kDurationS * kImuHz; ++i) {
@@ -177,8 +208,12 @@ Run run_inertial(const std::vector<ImageMeasurement>& images, const CameraCalibr
     sample.sequence = i;
     sample.angular_velocity += Eigen::Vector3d(0.004, -0.006, 0.005) + noise.sigma_angular_velocity * random.normal3();
     sample.specific_force += Eigen::Vector3d(0.05, -0.04, 0.03) + noise.sigma_specific_force * random.normal3();
-    while (next < images.size() && images[next].time_ns <= sample.time_ns) process(images[next++]);
-    process(sample);
+    while (next < images.size() && images[next].time_ns <= sample.time_ns) {
+      process(slam, images[next++], out);
+      keep_frames();
+    }
+    slam.process(sample);
+    keep_frames();
   }
   out.counts = slam.counts();
   return out;
@@ -197,44 +232,105 @@ void report(const char* who, const Run& run, std::size_t pictures, const Traject
     std::printf("estimates for %zu of %zu pictures only\n", run.estimate.times_ns.size(), pictures);
     return;
   }
+  // By the pictures after which it was not lost.
+  Trajectory found;
+  for (std::size_t i = 0; i < run.status.size(); ++i) {
+    if ((run.status[i] & kLost) != 0) continue;
+    found.times_ns.push_back(run.estimate.times_ns[i]);
+    found.poses.push_back(run.estimate.poses[i]);
+  }
   AssociationOptions options;
   options.interpolate_reference = true;
-  const Association pairs = associate(run.estimate, truth, options);
+  const Association pairs = associate(found, truth, options);
   const AbsoluteError error = absolute_error(pairs.estimate, pairs.reference, mode);
   double last = 0;
   for (std::size_t i = 0; i < error.times_ns.size(); ++i) {
     if (to_seconds(error.times_ns.back() - error.times_ns[i]) < kLastS) last = std::max(last, error.translation_m[i]);
   }
+  double guess = 0;
+  double says = 0;
+  for (std::size_t i = 0; i < run.status.size(); ++i) {
+    if ((run.status[i] & kLost) == 0) continue;
+    const auto at = std::lower_bound(truth.times_ns.begin(), truth.times_ns.end(), run.estimate.times_ns[i]);
+    if (at == truth.times_ns.end()) continue;
+    const Pose3& true_pose = truth.poses[static_cast<std::size_t>(at - truth.times_ns.begin())];
+    const double off = (error.alignment * run.estimate.poses[i].translation - true_pose.translation).norm();
+    if (off < guess) continue;
+    guess = off;
+    says = error.alignment.scale * run.sigma_m[i];
+  }
   const auto with = [&](std::uint32_t bit) {
-    return std::count_if(run.status.begin(), run.status.end(), [&](std::uint32_t s) { return (s & bit) != 0; });
+    return static_cast<long>(
+        std::count_if(run.status.begin(), run.status.end(), [&](std::uint32_t s) { return (s & bit) != 0; }));
   };
+  const auto count = [&](const char* name) { return static_cast<long>(count_of(run.counts, name)); };
   std::printf(
-      "%4zu/%zu  ATE %7.4f m  largest %7.4f  at the end %7.4f   few %3ld  recovered %2ld  anew %2ld   moving %4lld  "
-      "again %4lld\n",
-      run.estimate.times_ns.size(), pictures, error.translation.rmse, error.translation.max, last,
-      static_cast<long>(with(kFewFeatures)), static_cast<long>(with(kRecovered)),
-      static_cast<long>(with(kReinitialised)), static_cast<long long>(count_of(run.counts, "tracks.moving")),
-      static_cast<long long>(count_of(run.counts, "tracks.refound")));
+      "%3zu/%zu  ATE %7.4f m  largest %7.4f  end %7.4f   lost %2ld (%6.3f m, says %6.3f)  found %ld   few %2ld  "
+      "recovered %2ld  anew %2ld   moving %3ld  again %4ld   %4.1f, %5.1f ms\n",
+      run.estimate.times_ns.size(), pictures, error.translation.rmse, error.translation.max, last, with(kLost), guess,
+      says, with(kRefound), with(kFewFeatures), with(kRecovered), with(kReinitialised), count("tracks.moving"),
+      count("tracks.refound"), 1e3 * run.spent_s / static_cast<double>(pictures), 1e3 * run.longest_s);
   std::fflush(stdout);
 }
 
-void run(const World& world, const Case& c, const CameraCalibration& camera) {
-  const auto path = [&](double t) { return pose_of(world, c, t); };
-  std::vector<ImageMeasurement> images;
-  Trajectory truth;
-  Random random(2);
-  for (int i = 0; i < kDurationS * kRateHz; ++i) {
-    const double t = i / kRateHz;
-    truth.times_ns.push_back(from_seconds(t));
-    truth.poses.push_back(path(t));
-    ImageMeasurement image = world.renderer->render(truth.poses.back(), &random);
-    image.time_ns = from_seconds(t);
-    image.sequence = i;
-    if (auto changed = c.change(t, image)) images.push_back(std::move(*changed));
+struct Settings {
+  bool small = false;
+  std::uint64_t seeds = 1;
+  std::string only;
+};
+
+/// Cases that see the same pictures share them.
+class Pictures {
+ public:
+  Pictures(const World& world, std::uint64_t seed) : world_(world), seed_(seed) {}
+
+  const std::vector<ImageMeasurement>& of(const Case& c) {
+    const auto path = [&](double t) { return pose_of(world_, c, t); };
+    Trajectory truth;
+    for (int i = 0; i < kDurationS * kRateHz; ++i) {
+      truth.times_ns.push_back(from_seconds(i / kRateHz));
+      truth.poses.push_back(path(i / kRateHz));
+    }
+    const auto same = [](const Pose3& a, const Pose3& b) {
+      return a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs();
+    };
+    if (std::equal(truth.poses.begin(), truth.poses.end(), truth_.poses.begin(), truth_.poses.end(), same))
+      return images_;
+    truth_ = truth;
+    images_.clear();
+    Random random(seed_ + 1);
+    for (std::size_t i = 0; i < truth.poses.size(); ++i) {
+      images_.push_back(world_.renderer->render(truth.poses[i], &random));
+      images_.back().time_ns = truth.times_ns[i];
+      images_.back().sequence = static_cast<std::int64_t>(i);
+    }
+    return images_;
   }
-  std::printf("%s: %s\n", world.name, c.name);
-  report("alone", run_alone(images, camera), images.size(), truth, AlignmentMode::kSim3);
-  report("with IMU", run_inertial(images, camera, path), images.size(), truth, AlignmentMode::kSe3);
+  const Trajectory& truth() const { return truth_; }
+
+ private:
+  const World& world_;
+  std::uint64_t seed_;
+  Trajectory truth_;
+  std::vector<ImageMeasurement> images_;
+};
+
+void run(const World& world, const Case& c, const CameraCalibration& camera, Pictures& pictures, std::uint64_t seed,
+         const std::string& only) {
+  const std::string name = std::string(world.name) + ": " + c.name;
+  const bool alone = (name + ": alone").find(only) != std::string::npos;
+  const bool inertial = (name + ": with IMU").find(only) != std::string::npos;
+  if (!alone && !inertial) return;
+  std::vector<ImageMeasurement> images;
+  for (const ImageMeasurement& image : pictures.of(c)) {
+    if (auto changed = c.change(to_seconds(image.time_ns), image)) images.push_back(std::move(*changed));
+  }
+  std::printf("%s (seed %d)\n", name.c_str(), static_cast<int>(seed));
+  const auto path = [&](double t) { return pose_of(world, c, t); };
+  if (alone) report("alone", run_alone(images, camera), images.size(), pictures.truth(), AlignmentMode::kSim3);
+  if (inertial) {
+    report("with IMU", run_inertial(images, camera, path, seed), images.size(), pictures.truth(), AlignmentMode::kSe3);
+  }
 }
 
 }  // namespace
@@ -242,16 +338,36 @@ void run(const World& world, const Case& c, const CameraCalibration& camera) {
 
 int main(int argc, char** argv) {
   using namespace loc;
-  const bool small = argc > 1 && std::strcmp(argv[1], "small") == 0;
-  const CameraCalibration camera = small ? test::small_camera() : test::radtan_camera();
+  Settings settings;
+  for (int i = 1; i < argc; ++i) {
+    const std::string argument = argv[i];
+    if (argument == "--small") {
+      settings.small = true;
+    } else if (argument.starts_with("--seeds=")) {
+      settings.seeds = std::stoul(argument.substr(8));
+    } else if (argument.starts_with("--only=")) {
+      settings.only = argument.substr(7);
+    } else {
+      std::fprintf(stderr, "compare_images [--small] [--seeds=N] [--only=TEXT], not %s\n", argument.c_str());
+      return 1;
+    }
+  }
+  const CameraCalibration camera = settings.small ? test::small_camera() : test::radtan_camera();
   const RendererOptions options{.texel_m = 0.008, .noise_sigma = 2};
-  std::vector<World> worlds;
-  worlds.push_back({"room", test::swaying, std::make_unique<SceneRenderer>(box_room({}, Random(1)), camera, options)});
-  worlds.push_back({"street", driving,
-                    std::make_unique<SceneRenderer>(street({{0, 0, 0}, {20, 0, 0}, {40, 0, 0}}, {}, Random(1)), camera,
-                                                    RendererOptions{.noise_sigma = 2})});
-  for (const World& world : worlds) {
-    for (const Case& c : cases()) run(world, c, camera);
+  for (std::uint64_t seed = 1; seed <= settings.seeds; ++seed) {
+    std::vector<World> worlds;
+    worlds.push_back(
+        {"room", test::swaying, std::make_unique<SceneRenderer>(box_room({}, Random(seed)), camera, options)});
+    worlds.push_back({"street", driving,
+                      std::make_unique<SceneRenderer>(street({{0, 0, 0}, {20, 0, 0}, {40, 0, 0}}, {}, Random(seed)),
+                                                      camera, RendererOptions{.noise_sigma = 2})});
+    for (const World& world : worlds) {
+      Pictures pictures(world, seed);
+      // Those on the same path one after the other.
+      std::vector<Case> all = cases();
+      std::stable_partition(all.begin(), all.end(), [](const Case& c) { return c.pauses.empty(); });
+      for (const Case& c : all) run(world, c, camera, pictures, seed, settings.only);
+    }
   }
   return 0;
 }

@@ -552,5 +552,42 @@ TEST(SlamFaults, RejectedFeaturesAreToldBetweenFrames) {
   EXPECT_GT(rejected, 50);
 }
 
+// A lens that was covered: the map is as it was, and what follows finds itself in it. With other surroundings nothing
+// joins the map for relocate_s; then it goes on in them.
+TEST(SlamFaults, WhatDoesNotFindItselfInItsMapSaysSoUntilItDoes) {
+  for (const bool elsewhere : {false, true}) {
+    SlamOptions options = ride_options(SlamMotion::kConstantVelocity);
+    options.relocate_s = 0.75;
+    MonoSlam slam(options);
+    SlamRide world({.rest_s = 0, .blind_from_s = 3, .blind_to_s = elsewhere ? 3 : 4.5});
+    std::size_t map_before = 0;
+    int refound = 0;
+    world.run(6, [&](Measurement measurement) {
+      auto* frame = std::get_if<FeaturesMeasurement>(&measurement);
+      if (frame == nullptr) return;
+      const double t = seconds_of(measurement);
+      if (elsewhere && t >= 3) {
+        for (FeatureObservation& feature : frame->features) feature.id += 1000;
+      }
+      ASSERT_TRUE(slam.process(measurement));
+      const std::uint32_t status = slam.estimate().status;
+      const double end = elsewhere ? 3.75 : 4.5;  // relocate_s, then one more whose features are known
+      const double since = t - 2.95;
+      EXPECT_EQ((status & kLost) != 0, since > options.lost_after_s + 1e-9 && t < end - 1e-9) << t;
+      if (t < 2.96) map_before = slam.map().size();
+      if (t > 2.96 && t < end - 0.04 - (elsewhere ? 0.05 : 0)) {
+        EXPECT_EQ(slam.map().size(), map_before) << t;
+        EXPECT_TRUE((status & kRefound) == 0) << t;
+      }
+      if ((status & kRefound) == 0) return;
+      ++refound;
+      EXPECT_NEAR(t, 4.5, 1e-9);
+    });
+    EXPECT_EQ(refound, elsewhere ? 0 : 1);
+    EXPECT_EQ(count_of(slam.counts(), "slam.gone_on"), elsewhere ? 1 : 0);
+    EXPECT_GT(slam.frame().counts.measured, 20);
+  }
+}
+
 }  // namespace
 }  // namespace loc

@@ -309,6 +309,7 @@ TEST_F(SlamMessages, settings_come_back_from_their_file) {
   changed.start.heading = 0.7;
   changed.stand_still.min_speed = 0.123;
   changed.lost_after_s = 0.75;
+  changed.relocate_s = 2.5;
   write_slam_options(folder_.path() / "s.yaml", changed);
   const SlamOptions back = read_slam_options(folder_.path() / "s.yaml");
   EXPECT_EQ(slam_options_text(back), slam_options_text(changed));
@@ -327,6 +328,7 @@ TEST_F(SlamMessages, settings_come_back_from_their_file) {
   EXPECT_EQ(back.start.heading, 0.7);
   EXPECT_EQ(back.stand_still.min_speed, 0.123);
   EXPECT_EQ(back.lost_after_s, 0.75);
+  EXPECT_EQ(back.relocate_s, 2.5);
 }
 
 // The name that a line of a struct declares, "  double name = 1;  ///< …": empty when it is no field.

@@ -1,5 +1,5 @@
-// The front end: patches against pictures whose shift is known exactly, corners, tracks against the true projections of
-// a rendered room, and SLAM from pictures with something in view that moves by itself.
+// The front end: patches against pictures whose shift is known exactly, corners, and tracks against the true
+// projections of a rendered room.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,10 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "libloc/eval/trajectory_error.hpp"
 #include "libloc/vision/corner_detector.hpp"
 #include "libloc/vision/feature_tracker.hpp"
-#include "libloc/vision/image_slam.hpp"
 #include "libloc/vision/patch.hpp"
 #include "support/rendered_ride.hpp"
 
@@ -535,90 +533,6 @@ TEST(FeatureTracker, PicturesThatAreNotTheCamerasAreRefusedAndChangeNothing) {
   EXPECT_GE(same + 1, tracks);
   EXPECT_THROW(FeatureTracker(CameraCalibration{}), std::invalid_argument);
   EXPECT_THROW(FeatureTracker(room.calibration(), {.klt_window_px = 20}), std::invalid_argument);
-}
-
-// SLAM from pictures
-
-SlamOptions slam_options(const CameraCalibration& camera) {
-  SlamOptions out;
-  out.camera = camera;
-  out.map.max_features = 80;
-  out.map.min_visible = 40;
-  return slam_options_for_images(out);
-}
-
-TEST(ImageSlam, WhatMovesByItselfIsFoundOutAndDoesNotSpoilThePose) {
-  RoomCamera room(test::small_camera());
-  ImageSlam<MonoSlam> slam(slam_options(room.calibration()));
-  Trajectory estimate;
-  Trajectory truth;
-  double on_it = 0;
-  for (int i = 0; i < 60; ++i) {
-    const Pose3 pose = test::swaying(0.05 * i);
-    ImageMeasurement image = room.at(pose, i * kFrameNs);
-    // Against the parallax: what moves along with it looks like something near that stands still.
-    const double left = 200 - 3.0 * (i - 20);
-    const bool there = i >= 20;
-    if (there) image = test::covered(image, {.left = left, .top = 60, .width = 110, .height = 120});
-    ASSERT_TRUE(slam.process(image));
-    estimate.times_ns.push_back(image.time_ns);
-    estimate.poses.push_back({slam.slam().frame().q_world_camera, slam.slam().frame().camera_position});
-    truth.times_ns.push_back(image.time_ns);
-    truth.poses.push_back(pose);
-    if (i < 50) continue;
-    for (const SlamFeature& feature : slam.slam().frame().features) {
-      const bool used = feature.state == SlamFeatureState::kMeasured || feature.state == SlamFeatureState::kRescued;
-      const Vector2d in = feature.pixel_px - Vector2d(left + 8, 68);
-      on_it += used && in.x() > 0 && in.y() > 0 && in.x() < 94 && in.y() < 104 ? 1 : 0;
-    }
-  }
-  EXPECT_GE(count_of(slam.counts(), "tracks.moving"), 10);
-  EXPECT_LT(on_it / 10, 2);  // of about 40 that are used
-  // Without it: 0.004 m.
-  EXPECT_LT(absolute_error(estimate, truth, AlignmentMode::kSim3).translation.rmse, 0.02);
-}
-
-TEST(ImageSlam, PicturesThatComeLateOrTwiceAreNotUsedAndTheNextOneIs) {
-  RoomCamera room(test::small_camera());
-  ImageSlam<MonoSlam> slam(slam_options(room.calibration()));
-  for (int i = 0; i < 8; ++i) ASSERT_TRUE(slam.process(room.at(test::swaying(0.05 * i), i * kFrameNs)));
-  EXPECT_FALSE(slam.process(room.at(test::swaying(0.35), 7 * kFrameNs)));
-  EXPECT_FALSE(slam.process(room.at(test::swaying(0.25), 5 * kFrameNs)));
-  ImageMeasurement other = room.at(test::swaying(0.4), 8 * kFrameNs);
-  other.camera = 1;
-  EXPECT_FALSE(slam.process(other));
-  EXPECT_FALSE(slam.process(FeaturesMeasurement{}));
-  ASSERT_TRUE(slam.process(room.at(test::swaying(0.4), 8 * kFrameNs)));
-  EXPECT_GT(slam.slam().frame().counts.measured, 20);
-}
-
-TEST(ImageSlam, SearchesByTheMapAndFindsAgainWhatWasHiddenOrDark) {
-  RoomCamera room(test::small_camera());
-  ImageSlam<MonoSlam> slam(slam_options(room.calibration()));
-  for (int i = 0; i < 30; ++i) slam.process(room.at(test::swaying(0.05 * i), i * kFrameNs));
-  int searched = 0;
-  for (const TrackedFeature& one : slam.tracker().last()) searched += one.origin == TrackOrigin::kSearched ? 1 : 0;
-  EXPECT_GT(searched, 25);
-  // Half of them hidden for a while: found again as what they were.
-  const auto wall = [](double v, int x, int) { return x < 190 ? 90 : v; };
-  for (int i = 30; i < 36; ++i) slam.process(test::changed(room.at(test::swaying(0.05 * i), i * kFrameNs), wall));
-  const std::int64_t before = count_of(slam.counts(), "tracks.refound");
-  slam.process(room.at(test::swaying(0.05 * 36), 36 * kFrameNs));
-  EXPECT_GT(count_of(slam.counts(), "tracks.refound") - before, 10);
-  // Black for half a second: the tracks from before go on.
-  std::set<std::int64_t> ids;
-  for (const FeatureObservation& feature : slam.features().features) ids.insert(feature.id);
-  for (int i = 37; i < 47; ++i) {
-    slam.process(test::brightened(room.at(test::swaying(0.05 * i), i * kFrameNs), 0));
-    EXPECT_TRUE(slam.features().features.empty());
-  }
-  slam.process(room.at(test::swaying(0.05 * 47), 47 * kFrameNs));
-  int same = 0;
-  for (const FeatureObservation& feature : slam.features().features) same += ids.contains(feature.id) ? 1 : 0;
-  EXPECT_GT(same, 60);
-  EXPECT_GT(slam.slam().frame().counts.measured, 25);
-  slam.reset();
-  EXPECT_TRUE(slam.process(room.at(test::swaying(0), 0)));
 }
 
 }  // namespace
