@@ -1,0 +1,214 @@
+"""Draws LCM logs. They are read twice: to know start, extent, and the frame of each picture, and to draw."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import libloc
+from libloc import DataError, EstimateStatus, EstimateValid
+from libloc._core import LcmLogReader
+from libloc.view.geometry import Floats
+from libloc.view.intake import Intake, Item
+from libloc.view.pictures import Features, Frames
+from libloc.view.scene import Scene
+
+_EXTENT = 0.95  # share of the points that the view is made for
+_FEWEST = 3  # pairs for an alignment
+_PAIR_NS = 20_000_000  # estimate and reference are not further apart
+
+
+@dataclass
+class Window:
+    """Part of the logs, in measurement time since their start."""
+
+    start_s: float = 0.0
+    duration_s: float = float("inf")
+
+    def holds(self, time_ns: int, start_ns: int) -> bool:
+        return 0 <= 1e-9 * (time_ns - start_ns) - self.start_s <= self.duration_s
+
+
+@dataclass
+class Survey:
+    """What is in the logs, pictures aside."""
+
+    start_ns: int = 0
+    frames: Frames = field(default_factory=Frames)
+    maps: int = 0
+    last_map: Any = None
+    times_ns: list[int] = field(default_factory=list)  # of the estimates with position
+    positions: list[Any] = field(default_factory=list)
+    reference_times_ns: list[int] = field(default_factory=list)
+    reference_positions: list[Any] = field(default_factory=list)
+    origin: Any = None  # a fusion_t that tells it
+    scale_unknown: bool = False
+    method: str = ""
+    pictures: int = 0
+    picture_px: tuple[int, int] | None = None
+
+
+def _events(paths: Sequence[Path], damage: Counter[str]) -> Iterator[tuple[str, bytes]]:
+    for path in paths:
+        log = LcmLogReader(path)
+        for _, _, channel, data in log:
+            yield channel, data
+        for name, count in log.damage().items():
+            damage[f"log.{name}"] += count
+
+
+def survey(
+    paths: Sequence[Path], intake: Intake, camera: int, window: Window, counts: Counter[str]
+) -> Survey:
+    """Raises DataError for a file that is no LCM log, and when nothing in the logs can be drawn."""
+    for path in paths:
+        if path.is_file() and libloc.file_format(path) != "lcm":
+            raise DataError(f"{path}: is not an LCM log")
+    out = Survey()
+    first: int | None = None
+    for channel, data in _events(paths, counts):
+        item = intake.take(channel, data)
+        if item is None:
+            continue
+        if item.stream in ("statistics", "source", "status"):
+            continue
+        first = item.message.time_ns if first is None else min(first, item.message.time_ns)
+        if window.holds(item.message.time_ns, first):
+            _look(out, item, camera)
+    if first is None:
+        seen = intake.counts.keys() | intake.others.keys()
+        channels = sorted({name.removesuffix(".received").removesuffix(".refused") for name in seen})
+        raise DataError(
+            f"{', '.join(map(str, paths))}: nothing to be drawn in it; "
+            + (f"its channels: {', '.join(channels)} (--channel STREAM=NAME)" if channels else "it is empty")
+        )
+    out.start_ns = first
+    return out
+
+
+def _look(out: Survey, item: Item, camera: int) -> None:
+    m = item.message
+    match item.stream:
+        case "image":
+            if m.camera == camera:
+                out.pictures += 1
+                out.picture_px = out.picture_px or (m.width, m.height)
+        case "frame":
+            try:
+                out.frames.add(Features.of(m))
+            except ValueError:
+                return  # counted when it is drawn
+        case "map":
+            out.maps += 1
+            out.last_map = m
+        case "estimate":
+            out.method = m.method
+            out.scale_unknown |= bool(m.status & EstimateStatus.SCALE_UNKNOWN)
+            if m.valid & EstimateValid.POSITION and np.isfinite(m.position).all():
+                out.times_ns.append(m.time_ns)
+                out.positions.append(m.position)
+        case "reference":
+            if np.isfinite(m.position).all():
+                out.reference_times_ns.append(m.time_ns)
+                out.reference_positions.append(m.position)
+        case "fusion":
+            if out.origin is None and np.isfinite(m.origin_latitude):
+                out.origin = m
+
+
+def extent(found: Survey) -> tuple[Floats, float] | None:
+    """Centre and radius of what the view is to show: the way, and the part of the map that is well known."""
+    points = [np.array(found.positions, dtype=float).reshape(-1, 3)]
+    if found.last_map is not None:
+        p = np.array(found.last_map.position, dtype=float).reshape(-1, 3)
+        cov = np.array(found.last_map.position_cov, dtype=float).reshape(-1, 9)
+        with np.errstate(invalid="ignore"):
+            spread = 3 * np.sqrt(cov[:, [0, 4, 8]].sum(axis=1))
+        eye = points[0][-1] if len(points[0]) else np.zeros(3)
+        points.append(p[spread < 0.5 * np.linalg.norm(p - eye, axis=1)])
+    both = np.concatenate(points)
+    both = both[np.isfinite(both).all(axis=1)]
+    if len(both) == 0:
+        return None
+    low, high = np.quantile(both, [1 - _EXTENT, _EXTENT], axis=0)
+    if len(points[0]):
+        low, high = np.minimum(low, points[0].min(axis=0)), np.maximum(high, points[0].max(axis=0))
+    return (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-3)
+
+
+def alignment(found: Survey, how: str) -> tuple[Callable[[Floats], Floats] | None, str]:
+    """Takes the reference to the estimates' world, and a sentence about it; None: it cannot be drawn there.
+
+    how: auto, none, se3, sim3, yaw. auto: as far as the method does not know the world by itself.
+    """
+    if not found.reference_times_ns:
+        return None, ""
+    if how == "auto":
+        slam = found.method.endswith("slam")
+        how = "sim3" if found.scale_unknown else "se3" if slam and found.origin is None else "none"
+    if how == "none":
+        return (lambda points: points), "the reference is drawn as it is"
+    times, rows = np.unique(np.array(found.reference_times_ns, dtype=np.int64), return_index=True)
+    reference = np.array(found.reference_positions, dtype=float)[rows]
+    mine = np.array(found.times_ns, dtype=np.int64)
+    at = np.clip(np.searchsorted(times, mine), 1, max(len(times) - 1, 1))
+    at = np.minimum(at, len(times) - 1)
+    at = np.where(np.abs(times[at - 1] - mine) < np.abs(times[at] - mine), at - 1, at)
+    near = np.abs(times[at] - mine) <= _PAIR_NS
+    if near.sum() < _FEWEST:
+        return None, f"the reference is not drawn: {near.sum()} estimates are as late as one of its poses"
+    fit = libloc.align_points(reference[at[near]], np.array(found.positions, dtype=float)[near], how)
+    if not fit.ok:
+        return None, f"the reference is not drawn: {fit.failure}"
+    T, scale = fit.T_reference_estimate, fit.scale
+
+    def apply(points: Floats) -> Floats:
+        return T.transform(scale * points)
+
+    return apply, f"the reference is drawn after an alignment ({how}) with the estimates"
+
+
+def draw(
+    paths: Sequence[Path],
+    intake: Intake,
+    found: Survey,
+    window: Window,
+    scene: Scene,
+    stop: Callable[[], bool] = lambda: False,
+) -> None:
+    """Draws all that is in the window, each picture with its frame, until stop() says so."""
+    if found.origin is not None:
+        scene.space.fusion(found.origin)
+    scene.space.camera_from_frames = len(found.frames) > 0
+    started = False
+    for channel, data in _events(paths, Counter()):
+        if stop():
+            break
+        item = intake.take(channel, data)
+        if item is None:
+            continue
+        if item.stream in ("statistics", "source", "status"):
+            # Of the host's clock: they belong where the messages about them are.
+            if started:
+                scene.take(item)
+            continue
+        started = window.holds(item.message.time_ns, found.start_ns)
+        if not started:
+            continue
+        if item.stream == "image":
+            picture = item.message
+            frame = found.frames.pop(picture, scene.pictures.offset_ns)
+            scene.pictures.draw(picture, frame)
+        elif item.stream == "map" and found.maps == 1:
+            # An estimator off line writes its map at the end: it is of use from the start.
+            scene.space.map(item.message, found.start_ns)
+        else:
+            scene.take(item)
+    for frame in [] if stop() else found.frames.rest():
+        scene.pictures.draw(None, frame)
+    scene.finish()
