@@ -280,6 +280,7 @@ def _show_logs(rr: Any, options: argparse.Namespace, camera: Any | None, interru
     align, sentence = logs.alignment(found, options.align)
     layout = Layout(
         picture_px=found.picture_px, has_pictures=found.pictures > 0 or len(found.frames) > 0,
+        has_frames=len(found.frames) > 0, has_latency=found.has_latency,
         in_frustum=camera is not None,
     )  # fmt: skip
     axis_m = _AXIS_M

@@ -14,7 +14,8 @@ from libloc.view.plots import SERIES
 from libloc.view.recorder import TIMELINE
 
 _LEGEND = 0.16  # of the picture's height, below it
-_PLOTS = (("reprojection", "nis"), ("features", "time"), ("position_sigma", "heading_sigma"))
+_OF_FRAMES = (("reprojection", "nis"), ("features", "time"))
+_OF_ESTIMATES = ("position_sigma", "heading_sigma")
 
 
 @dataclass
@@ -23,6 +24,8 @@ class Layout:
 
     picture_px: tuple[int, int] | None = None
     has_pictures: bool = True
+    has_frames: bool = True  # of SLAM; without them some numbers do not exist
+    has_latency: bool = True
     centre: Floats | None = None  # of the scene, with radius: where the eye is put
     radius: float = 1.0
     follow: bool = False  # the newest, and only the last window_s of the numbers
@@ -40,7 +43,10 @@ def blueprint(rr: Any, layout: Layout) -> Any:
     top = [_space(rr, layout)]
     if layout.has_pictures:
         top.insert(0, picture)
-    columns = [rrb.Vertical(*(_plot(rr, name, layout) for name in names)) for names in _PLOTS]
+    plots = [*(_OF_FRAMES if layout.has_frames else ()), _OF_ESTIMATES]
+    if not layout.has_frames and layout.has_latency:
+        plots.insert(0, ("time",))
+    columns = [rrb.Vertical(*(_plot(rr, name, layout) for name in names)) for names in plots]
     axis = rrb.TimeAxis(link="LinkToGlobal") if not layout.follow else None
     lanes = rrb.StateTimelineView(origin="status", name="status", time_view=axis)
     shown = [rrb.encodings.TextLogColumn(kind) for kind in ("LogLevel", "Body")]
@@ -109,11 +115,18 @@ def _space(rr: Any, layout: Layout) -> Any:
         # From behind and above, so that the whole sphere is in view.
         direction = np.array([-0.55, -0.65, 0.52])
         eye = rrb.EyeControls3D(
-            position=layout.centre + 2.2 * layout.radius * direction, look_target=layout.centre
+            position=layout.centre + 2.2 * layout.radius * direction,
+            look_target=layout.centre,
+            tracking_entity="world/body" if layout.follow else None,
         )
     elif layout.follow:
         eye = rrb.EyeControls3D(tracking_entity="world/body")
     trails = {entity: until_now for entity in (space.TRAJECTORY, space.REFERENCE, space.GPS)}
     return rrb.Spatial3DView(
-        origin="world", contents=contents, name="space", eye_controls=eye, overrides=trails, line_grid=True
+        origin="world",
+        contents=contents,
+        name="space: way blue, reference grey, GPS orange",
+        eye_controls=eye,
+        overrides=trails,
+        line_grid=True,
     )

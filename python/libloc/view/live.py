@@ -13,6 +13,7 @@ from libloc.view.intake import Intake, Item
 from libloc.view.pictures import Features, Frames
 from libloc.view.scene import Scene
 
+_MESSAGES: Any = loc  # lcm-gen writes no types
 _FLUSH_S = 0.1
 _WAITING_PICTURES = 15  # for their frames: half a second at 30 per second
 _WAITING_FRAMES = 60  # for pictures: one that came too late, or was dropped, is not waited for any longer
@@ -26,7 +27,7 @@ class LivePictures:
         self._draw, self._offset_ns = draw, offset_ns
         self._frames = Frames()
         self._pictures: OrderedDict[tuple[int, int], tuple[Any, float]] = OrderedDict()
-        self._expects_frames = False
+        self._expects_frames, self._had_frames = True, False
 
     def picture(self, m: Any, now_s: float) -> None:
         frame = self._frames.pop(m, self._offset_ns)
@@ -36,7 +37,7 @@ class LivePictures:
             self._pictures[m.camera, m.sequence] = (m, now_s)
 
     def frame(self, frame: Features, now_s: float) -> None:
-        self._expects_frames = True
+        self._expects_frames = self._had_frames = True
         if (frame.camera, frame.sequence) not in self._pictures:
             self._frames.add(frame)
             if len(self._frames) > _WAITING_FRAMES:
@@ -47,12 +48,14 @@ class LivePictures:
         self._draw(m, frame)
 
     def give_up(self, now_s: float, patience_s: float = 0.5) -> None:
-        """Draws pictures that have waited long enough: at once where there are no frames at all."""
+        """Draws pictures that have waited long enough."""
         while self._pictures:
             m, came_s = next(iter(self._pictures.values()))
             waits = len(self._pictures) <= _WAITING_PICTURES and now_s - came_s < patience_s
             if self._expects_frames and waits:
                 return
+            # Where there are no frames at all, only the first pictures wait for them.
+            self._expects_frames = self._had_frames
             self._pictures.popitem(last=False)
             self._draw(m, None)
 
@@ -84,7 +87,7 @@ class LiveDrawing:
             self.pictures.picture(m, now_s)
             return
         if item.stream == "source":
-            self.ended = m.state != loc.source_status_t.STATE_RUNNING
+            self.ended = m.state != _MESSAGES.source_status_t.STATE_RUNNING
         if item.stream == "estimate":
             if self.scene.space.align is None:
                 self._tell_align(m.method)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import libloc
-from libloc import DataError, EstimateStatus, EstimateValid
+from libloc import NO_TIME, DataError, EstimateStatus, EstimateValid
 from libloc._core import LcmLogReader
 from libloc.view.geometry import Floats
 from libloc.view.intake import Intake, Item
@@ -49,6 +49,7 @@ class Survey:
     origin: Any = None  # a fusion_t that tells it
     scale_unknown: bool = False
     method: str = ""
+    has_latency: bool = False
     pictures: int = 0
     picture_px: tuple[int, int] | None = None
 
@@ -108,6 +109,7 @@ def _look(out: Survey, item: Item, camera: int) -> None:
             out.last_map = m
         case "estimate":
             out.method = m.method
+            out.has_latency |= m.host_time_ns != NO_TIME and m.publish_time_ns > m.host_time_ns
             out.scale_unknown |= bool(m.status & EstimateStatus.SCALE_UNKNOWN)
             if m.valid & EstimateValid.POSITION and np.isfinite(m.position).all():
                 out.times_ns.append(m.time_ns)
@@ -206,7 +208,7 @@ def draw(
             scene.pictures.draw(picture, frame)
         elif item.stream == "map" and found.maps == 1:
             # An estimator off line writes its map at the end: it is of use from the start.
-            scene.space.map(item.message, found.start_ns)
+            scene.space.map(item.message, found.start_ns + round(1e9 * window.start_s))
         else:
             scene.take(item)
     for frame in [] if stop() else found.frames.rest():

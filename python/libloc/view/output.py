@@ -184,14 +184,21 @@ class Viewer:
         self.close()
 
     def close(self) -> None:
-        if self.running:
-            self._process.send_signal(signal.SIGTERM)
-            try:
-                self._process.wait(timeout=5)
-            except subprocess.TimeoutExpired:
-                self._process.kill()
-                self._process.wait()
+        # The whole group: the program may be a script that has started the real one.
+        self._signal(signal.SIGTERM)
+        try:
+            self._process.wait(timeout=5)
+        except subprocess.TimeoutExpired:
+            pass
+        self._signal(signal.SIGKILL)
+        self._process.wait()
         self._said.close()
+
+    def _signal(self, number: int) -> None:
+        try:
+            os.killpg(self._process.pid, number)
+        except ProcessLookupError:
+            pass  # none of it is left
 
     def _wait(self) -> None:
         """Until it listens. Raises ViewerError."""

@@ -24,8 +24,8 @@ SEARCH_SIGMAS = 3.0  # FeatureTrackerOptions.search_sigmas
 IMAGE = "world/camera/image"
 _MATCH_NS = 1_000_000_000  # a picture and its frame are not further apart: a sequence may begin anew
 
-_image_t: Any = loc.image_t  # lcm-gen writes no types
-_slam_frame_t: Any = loc.slam_frame_t
+_MESSAGES: Any = loc  # lcm-gen writes no types
+_image_t, _slam_frame_t = _MESSAGES.image_t, _MESSAGES.slam_frame_t
 #: State, its name for people, colour: colours that colour-blind readers tell apart, as in loc-slam's summary.
 STATES = {
     _slam_frame_t.STATE_PREDICTED: ("expected, not used", (255, 127, 14)),
@@ -69,9 +69,9 @@ def jpeg_of(m: Any, quality: int) -> bytes:
     mode, layout, channels = _RAW[m.pixelformat]
     if m.row_stride < m.width * channels or len(data) < m.row_stride * (m.height - 1) + m.width * channels:
         raise PictureError(f"{len(data)} bytes, rows of {m.row_stride}: too few for its pixels")
-    picture = Image.frombuffer(mode, (m.width, m.height), data, "raw", layout, m.row_stride, 1)
+    pixels = Image.frombuffer(mode, (m.width, m.height), data, "raw", layout, m.row_stride, 1)
     file = io.BytesIO()
-    picture.save(file, "JPEG", quality=quality)
+    pixels.save(file, "JPEG", quality=quality)
     return file.getvalue()
 
 
@@ -152,6 +152,7 @@ class PictureDrawing:
         self.out, self.camera, self.offset_ns, self.quality = out, camera, offset_ns, quality
         self.counts: Counter[str] = Counter()
         self.size_px: tuple[int, int] | None = None
+        self._legend_px: tuple[int, int] | None = None
         self.why_damaged = ""  # the first one
         self._thinner = Thinner(rate_hz)
 
@@ -193,12 +194,13 @@ class PictureDrawing:
             return
         self.out.log(time_ns, IMAGE, self.out.rr.EncodedImage(contents=jpeg, media_type="image/jpeg"))
         self.counts["pictures.drawn"] += 1
-        if self.size_px != (picture.width, picture.height):
-            self.size_px = (picture.width, picture.height)
-            self._legend(*self.size_px)
+        self.size_px = (picture.width, picture.height)
 
     def _features(self, frame: Features) -> None:
         rr, out = self.out.rr, self.out
+        if self.size_px is not None and self.size_px != self._legend_px:
+            self._legend_px = self.size_px
+            self._legend(*self.size_px)
         measured = np.isfinite(frame.pixel_px).all(axis=1)
         at = np.where(measured[:, None], frame.pixel_px, frame.predicted_px)
         shown = np.isfinite(at).all(axis=1)

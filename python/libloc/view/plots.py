@@ -8,10 +8,10 @@ from typing import Any
 import loc
 import numpy as np
 
-import libloc
-from libloc import NO_TIME, EstimateStatus
+from libloc import NO_TIME, EstimateStatus, EstimateValid
 from libloc.view.recorder import Recorder
 
+_MESSAGES: Any = loc  # lcm-gen writes no types
 _HOLD_NS = 200_000_000  # a flag that comes and goes with every sample is shown as one span
 _BLUE, _ORANGE, _GREEN, _RED, _GREY = (
     (31, 119, 180), (255, 127, 14), (44, 160, 44), (214, 39, 40), (150, 150, 150),
@@ -96,11 +96,11 @@ class PlotDrawing:
             elif bit in self._flags_ns and not 0 <= time_ns - self._flags_ns[bit] < _HOLD_NS:
                 del self._flags_ns[bit]
                 self._lane(time_ns, name, "", bool(bit & _CALM))
-        known = libloc.EstimateValid(valid)
-        if known & libloc.EstimateValid.POSITION:
-            says = "pose" if known & libloc.EstimateValid.ORIENTATION else "position"
+        oriented = valid & EstimateValid.ORIENTATION
+        if valid & EstimateValid.POSITION:
+            says = "pose" if oriented else "position"
         else:
-            says = "orientation" if known & libloc.EstimateValid.ORIENTATION else "nothing"
+            says = "orientation" if oriented else "nothing"
         if says != self._valid:
             self._valid = says
             self._lane(time_ns, "estimate", says, calm=says != "nothing")
@@ -138,9 +138,9 @@ class PlotDrawing:
     def source(self, m: Any) -> None:
         """source_status_t"""
         states = {
-            loc.source_status_t.STATE_RUNNING: ("is read", "INFO"),
-            loc.source_status_t.STATE_ENDED: ("has ended", "INFO"),
-            loc.source_status_t.STATE_FAILED: ("has failed", "ERROR"),
+            _MESSAGES.source_status_t.STATE_RUNNING: ("is read", "INFO"),
+            _MESSAGES.source_status_t.STATE_ENDED: ("has ended", "INFO"),
+            _MESSAGES.source_status_t.STATE_FAILED: ("has failed", "ERROR"),
         }
         says, level = states.get(m.state, (f"state {m.state}, which is not known", "WARN"))
         text = f"source {m.source!r} {says}" + (f": {m.message}" if m.message else "")

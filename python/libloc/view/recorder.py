@@ -22,7 +22,7 @@ class Thinner:
     def due(self, time_ns: int) -> bool:
         if self._gap_ns == 0:
             return True
-        if self._due_ns is None or not -self._gap_ns < time_ns - self._due_ns < self._gap_ns:
+        if self._due_ns is None or not -self._gap_ns <= time_ns - self._due_ns < self._gap_ns:
             # The first one, after a gap, or time has stepped back.
             self._due_ns = time_ns + self._gap_ns
             return True

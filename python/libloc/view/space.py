@@ -30,7 +30,8 @@ _WAITING_FIXES = 100_000
 #: is hardly known, and its ellipsoid would hide all others.
 _FAR = 0.5
 
-_fix_t: Any = loc.gps_fix_t  # lcm-gen writes no types
+_MESSAGES: Any = loc  # lcm-gen writes no types
+_fix_t = _MESSAGES.gps_fix_t
 Align = Callable[[Floats], Floats]  # (N, 3) of the reference's world to (N, 3) of the estimates'
 
 
