@@ -27,7 +27,7 @@ import libloc
 
 rr = pytest.importorskip("rerun", reason="needs rerun-sdk")
 
-from libloc.view import geometry, intake, live, logs, output, pictures, receiver  # noqa: E402
+from libloc.view import geometry, intake, live, logs, output, pictures, receiver, target  # noqa: E402
 from libloc.view.plots import PlotDrawing  # noqa: E402
 from libloc.view.recorder import Recorder, Thinner  # noqa: E402
 from libloc.view.scene import Scene  # noqa: E402
@@ -464,7 +464,7 @@ def test_wrong_input(tmp_path, capsys, ride, monkeypatch):
     def fails(*arguments):
         assert view.main([*map(str, arguments), "--save", str(tmp_path / "x.rrd")]) == 1
         assert not (tmp_path / "x.rrd").exists()
-        assert not list(tmp_path.glob(".*"))
+        assert not list(tmp_path.glob("*.rrd"))
         return capsys.readouterr().err
 
     assert "none.log" in fails(tmp_path / "none.log")
@@ -615,7 +615,7 @@ def test_a_log_becomes_a_recording(ride, rig, tmp_path, capsys):
     assert "pictures.drawn = 10" in out
     assert "gps.without_origin = 5" in out
     assert "aligned" in out or "alignment (se3)" in out
-    assert not list(tmp_path.glob(".*"))
+    assert list(tmp_path.glob("*.rrd")) == [path]
     rows = rows_of(path)
     assert rows["/plots/reprojection"] == 10 + 1  # and the names of the lines
     assert rows["/world/camera/image"] == 10 + 2  # lens, legend
@@ -633,7 +633,7 @@ def test_live_over_a_hub_until_ctrl_c(tmp_path):
         for channel, m in messages():
             connection.publish(channel, m.encode())
             if channel == "LOC_IMAGE":
-                time.sleep(0.1)
+                time.sleep(0.05)
         time.sleep(0.5)
         process.send_signal(signal.SIGINT)
         out, errors = process.communicate(timeout=30)
@@ -656,6 +656,35 @@ def wait_for(process, text):
         if text in line:
             return line
     raise AssertionError(f"{text!r} was not said")
+
+
+def test_a_full_disk(tmp_path, monkeypatch, capsys):
+    """What was written by then stays; an error says which file."""
+
+    class Full:
+        def __getattr__(self, name):
+            return getattr(self.stream, name)
+
+        def __init__(self, *arguments):
+            self.stream = rr.RecordingStream(*arguments)
+
+        def flush(self, timeout_sec):
+            self.stream.flush(timeout_sec=timeout_sec)
+            raise RuntimeError("File-writer thread shut down prematurely")
+
+    class Module:
+        RecordingStream = Full
+
+        def __getattr__(self, name):
+            return getattr(rr, name)
+
+    made = target.Target(Module(), tmp_path / "x.rrd", None, (800, 600), None)
+    with pytest.raises(output.ViewerError, match=r"x\.part\.rrd: .* is the disk full"), made:
+        made.keep_part = True
+        made.stream.log("here", rr.TextLog("there"))
+        made.check(time.monotonic())
+    assert [one.name for one in tmp_path.iterdir()] == ["x.part.rrd"]
+    assert rows_of(tmp_path / "x.part.rrd")["/here"] == 1
 
 
 def test_nothing_to_hear(tmp_path, capsys):

@@ -29,15 +29,10 @@ from __future__ import annotations
 import argparse
 import os
 import re
-import signal
 import sys
-import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -55,6 +50,7 @@ from libloc.view.receiver import Receiver
 from libloc.view.recorder import Recorder
 from libloc.view.scene import Scene
 from libloc.view.space import SpaceDrawing
+from libloc.view.target import Interrupt, Target, ViewerPlan
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"
@@ -175,27 +171,6 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
-class Interrupt:
-    """The first Ctrl-C, or a request to end, is only noted; the next one ends the program."""
-
-    def __init__(self) -> None:
-        self.asked = False
-
-    def __enter__(self) -> Interrupt:
-        self._before = {
-            number: signal.signal(number, self._handle) for number in (signal.SIGINT, signal.SIGTERM)
-        }
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
-
-    def _handle(self, number: int, frame: FrameType | None) -> None:
-        self.asked = True
-        signal.signal(number, signal.default_int_handler)
-
-
 def _say(text: str) -> None:
     print(f"loc-view: {text}", file=sys.stderr, flush=True)
 
@@ -210,54 +185,17 @@ def _camera_of(options: argparse.Namespace) -> Any | None:
     return cameras[options.camera]
 
 
-class Target:
-    """The recording with all places where it goes."""
+def _target(rr: Any, options: argparse.Namespace) -> Target:
+    kind = "web" if options.web else "window" if options.spawn else None
+    viewer = None if kind is None else ViewerPlan(kind, options.memory, options.web_port, options.data_port)
+    return Target(rr, options.save, options.screenshot, options.size, viewer)
 
-    def __init__(self, rr: Any, options: argparse.Namespace, stack: ExitStack) -> None:
-        self.options = options
-        self._file: Path | None = None
-        self._kept = options.save
-        if options.save is not None:
-            self._file = options.save.with_name(f".{options.save.stem}.part.rrd")
-        elif options.screenshot is not None:
-            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="loc-view-"))
-            self._file = Path(folder) / "view.rrd"
-        self.viewer: output.Viewer | None = None
-        if options.web or options.spawn:
-            self.viewer = stack.enter_context(
-                output.Viewer(
-                    "web" if options.web else "window", options.memory, options.web_port, options.data_port
-                )
-            )
-        # The recording ends before the viewer does: what is entered last is left first.
-        self.stream = rr.RecordingStream("libloc-view")
-        sinks = []
-        if self._file is not None:
-            sinks.append(rr.FileSink(str(self._file)))
-        if self.viewer is not None:
-            sinks.append(rr.GrpcSink(self.viewer.data_url))
-        self.stream.set_sinks(*sinks)
-        stack.callback(self._remove_part)
 
-    def finish(self) -> None:
-        """Writes the rest, and the screenshot."""
-        self.stream.flush(timeout_sec=60)
-        if self._file is None:
-            return
-        # With the file complete, the viewer can go on with what it has.
-        self.stream.disconnect()
-        if self._kept is not None:
-            self._file.replace(self._kept)
-            self._file = self._kept
-            print(f"written: {self._kept} ({self._kept.stat().st_size / 1e6:.1f} MB)", flush=True)
-        if self.options.screenshot is not None:
-            for complaint in output.screenshot(self._file, self.options.screenshot, self.options.size):
-                _say(f"warning: the viewer says: {complaint}")
-            print(f"written: {self.options.screenshot}", flush=True)
-
-    def _remove_part(self) -> None:
-        if self._file is not None and self._file != self._kept:
-            self._file.unlink(missing_ok=True)
+def _finish(target: Target) -> None:
+    for line in target.finish():
+        print(line, flush=True)
+    for complaint in target.complaints:
+        _say(f"warning: the viewer says: {complaint}")
 
 
 def _scene(out: Recorder, camera: Any | None, options: argparse.Namespace, axis_m: float) -> Scene:
@@ -287,8 +225,7 @@ def _show_logs(rr: Any, options: argparse.Namespace, camera: Any | None, interru
     if seen is not None:
         layout.centre, layout.radius = seen
         axis_m = 0.07 * layout.radius
-    with ExitStack() as stack:
-        target = Target(rr, options, stack)
+    with _target(rr, options) as target:
         target.stream.send_blueprint(blueprint(rr, layout))
         scene = _scene(Recorder(rr, target.stream, found.start_ns), camera, options, axis_m)
         scene.space.align = align
@@ -298,7 +235,7 @@ def _show_logs(rr: Any, options: argparse.Namespace, camera: Any | None, interru
         intake = Intake(channels)
         logs.draw(options.log, intake, found, window, scene, lambda: interrupt.asked)
         _report(scene, intake, counts)
-        target.finish()
+        _finish(target)
         interrupted = interrupt.asked
         if target.viewer is not None:
             if options.web:
@@ -312,9 +249,7 @@ def _show_live(rr: Any, options: argparse.Namespace, camera: Any | None, interru
     channels = channels_of(options.channel)
     intake = Intake(channels)
     picture_channel = next(name for name, stream in channels.items() if stream == "image")
-    with ExitStack() as stack:
-        receiver = stack.enter_context(Receiver(options.lcm_url, channels, picture_channel))
-        target = Target(rr, options, stack)
+    with Receiver(options.lcm_url, channels, picture_channel) as receiver, _target(rr, options) as target:
         if target.viewer is not None and options.web:
             print(target.viewer.how_to_reach(), flush=True)
         scene = _scene(Recorder(rr, target.stream), camera, options, _AXIS_M)
@@ -322,6 +257,7 @@ def _show_live(rr: Any, options: argparse.Namespace, camera: Any | None, interru
         target.stream.send_blueprint(blueprint(rr, layout))
         drawing = LiveDrawing(scene, intake, options.align)
         began = heard = time.monotonic()
+        target.keep_part = True
         _say(f"listening on {options.lcm_url}, Ctrl-C ends it")
         while not interrupt.asked and (target.viewer is None or target.viewer.running):
             now = time.monotonic()
@@ -336,6 +272,7 @@ def _show_live(rr: Any, options: argparse.Namespace, camera: Any | None, interru
                 if _learn(layout, scene, item):
                     target.stream.send_blueprint(blueprint(rr, layout))
             drawing.tick(now)
+            target.check(now)
             if now - heard > _SILENCE_S:
                 heard = now
                 _say(f"nothing has come on {options.lcm_url} for {_SILENCE_S:g} s")
@@ -344,10 +281,11 @@ def _show_live(rr: Any, options: argparse.Namespace, camera: Any | None, interru
         drawing.finish()
         _report(scene, intake, receiver.counts)
         if not any(name.endswith(".received") for name in intake.counts):
+            target.keep_part = False
             raise DataError(
                 f"nothing to be drawn has come on {options.lcm_url}: is loc-estimator running there?"
             )
-        target.finish()
+        _finish(target)
     return EXIT_OK
 
 
@@ -409,18 +347,6 @@ def _check_files(options: argparse.Namespace) -> None:
         output.check_screenshots()
 
 
-@contextmanager
-def _no_warnings_of_rerun() -> Iterator[None]:
-    """Its Rust part would say on stderr where a file was written."""
-    before = os.environ.get("RUST_LOG")
-    os.environ.setdefault("RUST_LOG", "error")
-    try:
-        yield
-    finally:
-        if before is None:
-            os.environ.pop("RUST_LOG", None)
-
-
 def main(arguments: list[str] | None = None) -> int:
     parser = make_parser()
     options = parser.parse_args(arguments)
@@ -428,8 +354,8 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         _check_files(options)
         camera = _camera_of(options)
-        with _no_warnings_of_rerun(), Interrupt() as interrupt:
-            rr = output.import_rerun()
+        rr = output.import_rerun()
+        with Interrupt() as interrupt:
             show = _show_logs if options.log else _show_live
             return show(rr, options, camera, interrupt)
     except (DataError, ValueError, OSError, MissingPackageError, output.ViewerError) as error:

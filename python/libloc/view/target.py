@@ -1,0 +1,134 @@
+"""The recording with all places where it goes, and how it ends."""
+
+from __future__ import annotations
+
+import signal
+import tempfile
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType, TracebackType
+from typing import Any
+
+from libloc.view import output
+
+_CHECK_S = 5.0
+_FLUSH_S = 60.0
+
+
+class Interrupt:
+    """The first Ctrl-C, or a request to end, is only noted; the next one ends the program."""
+
+    def __init__(self) -> None:
+        self.asked = False
+
+    def __enter__(self) -> Interrupt:
+        self._before = {
+            number: signal.signal(number, self._handle) for number in (signal.SIGINT, signal.SIGTERM)
+        }
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        self.asked = True
+        signal.signal(number, signal.default_int_handler)
+
+
+@dataclass(frozen=True)
+class ViewerPlan:
+    """As output.Viewer takes it."""
+
+    kind: str
+    memory: str
+    web_port: int
+    data_port: int
+
+
+class Target:
+    """A recording that goes into a file, to a viewer, or both.
+
+    The file has its name when it is complete; until then it is NAME.part.rrd.
+    """
+
+    def __init__(
+        self,
+        rr: Any,
+        save: Path | None,
+        screenshot: Path | None,
+        size: tuple[int, int],
+        viewer: ViewerPlan | None,
+    ) -> None:
+        self.keep_part = False  #: of the file, when it does not come to finish()
+        self._rr, self._save, self._screenshot, self._size, self._plan = rr, save, screenshot, size, viewer
+        self.viewer: output.Viewer | None = None
+        self.complaints: list[str] = []  #: of the viewer about what is in the screenshot
+        self._checked_s = 0.0
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Target:
+        with ExitStack() as stack:
+            self._file: Path | None = None
+            if self._save is not None:
+                self._file = self._save.with_suffix(".part.rrd")
+                stack.callback(self._tidy)
+            elif self._screenshot is not None:
+                folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="loc-view-"))
+                self._file = Path(folder) / "view.rrd"
+            if self._plan is not None:
+                plan = self._plan
+                viewer = output.Viewer(plan.kind, plan.memory, plan.web_port, plan.data_port)
+                self.viewer = stack.enter_context(viewer)
+            self.stream = self._rr.RecordingStream("libloc-view")
+            sinks: list[Any] = [] if self._file is None else [self._rr.FileSink(str(self._file))]
+            if self.viewer is not None:
+                sinks.append(self._rr.GrpcSink(self.viewer.data_url))
+            self.stream.set_sinks(*sinks)
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._stack.close()
+
+    def check(self, now_s: float) -> None:
+        """Raises ViewerError when nothing can be written any more: looks for a full disk every few seconds."""
+        if now_s - self._checked_s < _CHECK_S:
+            return
+        self._checked_s = now_s
+        self._flush(_CHECK_S, patient=True)
+
+    def finish(self) -> list[str]:
+        """Writes the rest, and the screenshot; tells what was written. Raises ViewerError."""
+        self._flush(_FLUSH_S)
+        if self._file is None:
+            return []
+        self.stream.disconnect()  # its end is in the file then
+        done = []
+        if self._save is not None:
+            self._file.replace(self._save)
+            self._file = self._save
+            done.append(f"written: {self._save} ({self._save.stat().st_size / 1e6:.1f} MB)")
+        if self._screenshot is not None:
+            self.complaints = output.screenshot(self._file, self._screenshot, self._size)
+            done.append(f"written: {self._screenshot}")
+        return done
+
+    def _flush(self, timeout_s: float, patient: bool = False) -> None:
+        """patient: that it takes longer than that, as on a busy machine, is no error."""
+        try:
+            self.stream.flush(timeout_sec=timeout_s)
+        except (RuntimeError, ValueError, OSError) as error:
+            if patient and "shut down" not in str(error):
+                return
+            where = f"{self._file}" if self._file is not None else "the viewer"
+            raise output.ViewerError(
+                f"{where}: cannot be written any more: {error} (is the disk full?)"
+            ) from None
+
+    def _tidy(self) -> None:
+        if self._file is None or self._file == self._save or not self._file.exists():
+            return
+        if not self.keep_part:
+            self._file.unlink()
