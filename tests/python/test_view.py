@@ -679,7 +679,7 @@ def test_a_full_disk(tmp_path, monkeypatch, capsys):
             return getattr(rr, name)
 
     made = target.Target(Module(), tmp_path / "x.rrd", None, (800, 600), None)
-    with pytest.raises(output.ViewerError, match=r"x\.part\.rrd: .* is the disk full"), made:
+    with pytest.raises(output.ViewerError, match=r"x\.part\.rrd: .*is the disk full"), made:
         made.keep_part = True
         made.stream.log("here", rr.TextLog("there"))
         made.check(time.monotonic())

@@ -93,7 +93,7 @@ class Target:
         self._stack.close()
 
     def check(self, now_s: float) -> None:
-        """Raises ViewerError when nothing can be written any more: looks for a full disk every few seconds."""
+        """Raises ViewerError when nothing can be written any more. Looks every few seconds."""
         if now_s - self._checked_s < _CHECK_S:
             return
         self._checked_s = now_s
