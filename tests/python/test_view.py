@@ -588,14 +588,19 @@ def rows_of(path):
     return rows
 
 
-def start(*arguments):
-    return subprocess.Popen(
+@contextmanager
+def started(*arguments):
+    with subprocess.Popen(
         [*VIEW, *map(str, arguments)],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env=os.environ | {"PYTHONUNBUFFERED": "1"},
         # A test run in the background ignores Ctrl-C, and children inherit that.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )  # fmt: skip
+    ) as process:  # fmt: skip
+        try:
+            yield process
+        finally:
+            process.terminate()
 
 
 @contextmanager
@@ -625,8 +630,7 @@ def test_a_log_becomes_a_recording(ride, rig, tmp_path, capsys):
 
 def test_live_over_a_hub_until_ctrl_c(tmp_path):
     path = tmp_path / "live.rrd"
-    with hub() as url:
-        process = start("--lcm-url", url, "--save", path)
+    with hub() as url, started("--lcm-url", url, "--save", path) as process:
         assert "listening" in wait_for(process, "listening")
         time.sleep(0.2)
         connection = lcm.LCM(url)
@@ -710,28 +714,27 @@ def listening_addresses(port):
 def test_in_the_browser_of_this_machine_alone(ride, tmp_path, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    process = start(
-        ride, "--memory", "100MB", "--web-port", output.free_port(), "--data-port", output.free_port()
-    )
-    assert "no display" in wait_for(process, "no display")
-    lines = []
-    for line in process.stdout:
-        lines.append(line)
-        if "Ctrl-C" in line:
-            break
-    text = "".join(lines)
-    page = re.search(r"open (http://127\.0\.0\.1:(\d+)\?url=\S+)", text)
-    forwards = re.search(r"ssh -L (\d+):127\.0\.0\.1:\1 -L (\d+):127\.0\.0\.1:\2 ", text)
-    assert page and forwards and page[2] == forwards[1]
-    with urllib.request.urlopen(page[1], timeout=10) as answer:
-        assert b"<html" in answer.read().lower()
-    for port in forwards.groups():
-        assert listening_addresses(int(port)) == {"0100007F"}
-    process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=30)
-    assert process.returncode == 0, errors
-    for port in forwards.groups():
-        assert listening_addresses(int(port)) == set()
+    ports = "--web-port", output.free_port(), "--data-port", output.free_port()
+    with started(ride, "--memory", "100MB", *ports) as process:
+        assert "no display" in wait_for(process, "no display")
+        lines = []
+        for line in process.stdout:
+            lines.append(line)
+            if "Ctrl-C" in line:
+                break
+        text = "".join(lines)
+        page = re.search(r"open (http://127\.0\.0\.1:(\d+)\?url=\S+)", text)
+        forwards = re.search(r"ssh -L (\d+):127\.0\.0\.1:\1 -L (\d+):127\.0\.0\.1:\2 ", text)
+        assert page and forwards and page[2] == forwards[1]
+        with urllib.request.urlopen(page[1], timeout=10) as answer:
+            assert b"<html" in answer.read().lower()
+        for port in forwards.groups():
+            assert listening_addresses(int(port)) == {"0100007F"}
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=30)
+        assert process.returncode == 0, errors
+        for port in forwards.groups():
+            assert listening_addresses(int(port)) == set()
 
 
 @pytest.mark.slow

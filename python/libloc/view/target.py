@@ -86,6 +86,7 @@ class Target:
             if self.viewer is not None:
                 sinks.append(self._rr.GrpcSink(self.viewer.data_url))
             self.stream.set_sinks(*sinks)
+            stack.callback(self.stream.disconnect)  # before the viewer ends
             self._stack = stack.pop_all()
         return self
 
