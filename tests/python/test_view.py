@@ -127,6 +127,10 @@ def messages(seconds=1.0):
         np.diag([900.0] * 3).ravel().tolist(),
     ]
     out.append((points.time_ns, "LOC_MAP", points))
+    status = loc.estimator_status_t()
+    status.measurement_time_ns, status.method = START + 300_000_000, "inertial-slam"
+    status.size, status.condition, status.since_s = 1, ["no GPS"], [0.3]
+    out.append((status.measurement_time_ns, "LOC_ESTIMATOR_STATUS", status))
     frame_ = libloc.LocalFrame(*ORIGIN)
     for i in range(round(5 * seconds)):
         t = START + i * 200_000_000
@@ -292,7 +296,7 @@ def test_space(ride, tmp_path):
     path = write(tmp_path / "tied.log", [*messages(), ("LOC_FUSION", fusion(START))])
     stream, counts = drawn(path)
     assert counts["estimates.drawn"] == pytest.approx(30, abs=1)
-    trail = stream.of("world/trajectory")
+    trail = stream.of("world/trajectory/tied")
     points = np.concatenate([values(line.strips)[0] for _, line in trail])
     np.testing.assert_allclose(points[0], where(0), atol=1e-6)
     np.testing.assert_allclose(points[-1], where(0.995), atol=0.08)
@@ -345,6 +349,9 @@ def test_numbers_and_status(ride):
     ]
     assert lane == [(START + 200_000_000, ["on"]), (START + 590_000_000, [""])]
     assert [w.state.as_arrow_array().to_pylist() for t, w in stream.of("status/estimate") if t] == [["pose"]]
+    assert [(t, w.text.as_arrow_array().to_pylist()) for t, w in stream.of("messages")] == [
+        (START + 300_000_000, ["inertial-slam: no GPS"])
+    ]
 
 
 def test_what_the_estimator_says():
@@ -371,6 +378,31 @@ def test_part_of_a_log(ride):
     stream, counts = drawn(ride, start_s=0.25, duration_s=0.5)
     assert counts["pictures.drawn"] == 5  # at 0.3 to 0.7 s
     assert min(t for _, t, _ in stream.logged if t is not None) >= START + 200_000_000
+
+
+def test_no_line_between_two_worlds(tmp_path):
+    """Until GPS has tied the map to the Earth, positions are in the map's own world."""
+    stream = Stream()
+    space = SpaceDrawing(Recorder(rr, stream), None, 0.1)
+    events = []
+    for i in range(40):
+        m = estimate(START + i * 50_000_000, i, where(0.05 * i) + (0 if i < 20 else 1000))
+        if i < 20:
+            m.valid &= ~m.VALID_HEADING
+        events.append(("LOC_ESTIMATE", m))
+        space.estimate(m)
+    space.finish()
+    for entity, low, high in (("local", 0, 10), ("tied", 1000, 1010)):
+        points = np.concatenate([values(one.strips)[0] for _, one in stream.of(f"world/trajectory/{entity}")])
+        assert low <= points[:, 0].min() <= points[:, 0].max() <= high
+    assert space.tied_ns == START + 20 * 50_000_000
+    # The view is made for the world that the log ends in.
+    path = write(tmp_path / "tied.log", events)
+    found = logs.survey([path], intake.Intake(intake.channels_of([])), 0, logs.Window(), Counter())
+    assert found.became_tied
+    centre, radius = logs.extent(found)
+    assert centre[0] > 1000
+    assert radius < 10
 
 
 def test_gps_waits_for_the_origin():

@@ -218,7 +218,7 @@ def _show_logs(rr: Any, options: argparse.Namespace, camera: Any | None, interru
     align, sentence = logs.alignment(found, options.align)
     layout = Layout(
         picture_px=found.picture_px, has_pictures=found.pictures > 0 or len(found.frames) > 0,
-        has_frames=len(found.frames) > 0, has_latency=found.has_latency,
+        has_frames=len(found.frames) > 0, has_latency=found.has_latency, hide_local=found.became_tied,
         in_frustum=camera is not None,
     )  # fmt: skip
     axis_m = _AXIS_M
@@ -290,7 +290,12 @@ def _show_live(rr: Any, options: argparse.Namespace, camera: Any | None, interru
 
 
 def _learn(layout: Layout, scene: Scene, item: Any) -> bool:
-    """True when the layout is to be another one: the first picture, the first map."""
+    """True when the layout is to be another one: the first picture, the first map, another world."""
+    if scene.space.tied_ns is not None and not layout.hide_local:
+        layout.hide_local, layout.centre = True, None  # the next map has another place, and perhaps unit
+        text = "the map is tied to the Earth: the way until now was in the map's own world, it is not shown"
+        scene.plots.text(scene.space.tied_ns, text, "INFO")
+        return True
     if layout.picture_px is None and scene.pictures.size_px is not None:
         layout.picture_px = scene.pictures.size_px
         return True

@@ -30,6 +30,7 @@ class Layout:
     radius: float = 1.0
     follow: bool = False  # the newest, and only the last window_s of the numbers
     window_s: float = 60.0
+    hide_local: bool = False  # the way before GPS has tied the map to the Earth: it was in another world
     in_frustum: bool = False  # the picture, where the camera's calibration is known
 
 
@@ -110,6 +111,8 @@ def _space(rr: Any, layout: Layout) -> Any:
     ]
     if not layout.in_frustum:
         contents.append(f"- {IMAGE}/**")
+    if layout.hide_local:
+        contents.append(f"- {space.LOCAL_TRAJECTORY}")
     eye = None
     if layout.centre is not None:
         # From behind and above, so that the whole sphere is in view.
@@ -121,7 +124,9 @@ def _space(rr: Any, layout: Layout) -> Any:
         )
     elif layout.follow:
         eye = rrb.EyeControls3D(tracking_entity="world/body")
-    trails = {entity: until_now for entity in (space.TRAJECTORY, space.REFERENCE, space.GPS)}
+    trails = {
+        entity: until_now for entity in (space.TRAJECTORY, space.LOCAL_TRAJECTORY, space.REFERENCE, space.GPS)
+    }
     return rrb.Spatial3DView(
         origin="world",
         contents=contents,

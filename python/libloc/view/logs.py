@@ -44,6 +44,8 @@ class Survey:
     last_map: Any = None
     times_ns: list[int] = field(default_factory=list)  # of the estimates with position
     positions: list[Any] = field(default_factory=list)
+    tied: bool = False  # to north, so that the positions are in the world that the log ends in
+    became_tied: bool = False  # after others that were not
     reference_times_ns: list[int] = field(default_factory=list)
     reference_positions: list[Any] = field(default_factory=list)
     origin: Any = None  # a fusion_t that tells it
@@ -112,6 +114,12 @@ def _look(out: Survey, item: Item, camera: int) -> None:
             out.has_latency |= m.host_time_ns != NO_TIME and m.publish_time_ns > m.host_time_ns
             out.scale_unknown |= bool(m.status & EstimateStatus.SCALE_UNKNOWN)
             if m.valid & EstimateValid.POSITION and np.isfinite(m.position).all():
+                tied = bool(m.valid & EstimateValid.HEADING)
+                if tied and not out.tied and out.positions:
+                    out.became_tied = True
+                    out.times_ns.clear()
+                    out.positions.clear()
+                out.tied = tied
                 out.times_ns.append(m.time_ns)
                 out.positions.append(m.position)
         case "reference":

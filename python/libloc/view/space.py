@@ -20,7 +20,9 @@ from libloc.view.geometry import Floats, ellipsoids, is_rotation, rotation_of
 from libloc.view.recorder import Recorder
 
 SIGMAS = 3.0
-TRAJECTORY, REFERENCE, GPS = "world/trajectory", "world/reference", "world/gps"
+# The way, tied to north and with GPS to the Earth; and as long as the world is the map's own.
+TRAJECTORY, LOCAL_TRAJECTORY = "world/trajectory/tied", "world/trajectory/local"
+REFERENCE, GPS = "world/reference", "world/gps"
 CAMERA = "world/camera"
 _BLUE, _GREY, _ORANGE = (31, 119, 180), (150, 150, 150), (255, 127, 14)
 _TRAIL_NS = 100_000_000  # length of a piece of a trail: many short ones are slow to draw
@@ -76,7 +78,8 @@ class SpaceDrawing:
         self.align: Align | None = None  #: of the reference; None: it is not drawn
         self.camera_from_frames = False
         self._axis_m = 0.0
-        self._trail = Trail(TRAJECTORY, _BLUE, 0.9)
+        self._trail = Trail(LOCAL_TRAJECTORY, _BLUE, 0.9)
+        self.tied_ns: int | None = None  #: when the world became another one, tied to north
         self._reference = Trail(REFERENCE, _GREY, 0.7)
         self._origin: Any = None  # libloc.LocalFrame
         self._origin_of: tuple[float, float, float] | None = None
@@ -125,6 +128,7 @@ class SpaceDrawing:
         out.log(t, "world/body", rr.Transform3D(translation=place, **turn))
         self.counts["estimates.drawn"] += 1
         if placed:
+            self._tie(t, bool(m.valid & EstimateValid.HEADING))
             self._trail.add(out, t, p)
         if not self.camera_from_frames:
             self.where = place
@@ -133,6 +137,16 @@ class SpaceDrawing:
                 turned = np.roll(T.rotation_wxyz, -1)
                 out.log(t, CAMERA, rr.Transform3D(translation=T.translation, quaternion=turned))
         return self._sigmas(m, q if oriented else None, p if placed else None)
+
+    def _tie(self, time_ns: int, tied: bool) -> None:
+        """When GPS ties the map to the Earth, the way goes on in another world: no line leads there."""
+        entity = TRAJECTORY if tied else LOCAL_TRAJECTORY
+        if entity == self._trail.entity:
+            return
+        if tied and self._trail.points:
+            self.tied_ns = time_ns
+        self._trail.flush(self.out)
+        self._trail = Trail(entity, _BLUE, 0.9)
 
     def _sigmas(self, m: Any, q: Floats | None, p: Floats | None) -> tuple[Floats | None, float]:
         dim = m.covariance_dim
