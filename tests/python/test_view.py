@@ -123,7 +123,7 @@ def messages(seconds=1.0):
     points.size, points.point_id = 2, [1, 2]
     points.position = [[5.0, 0.0, 1.0], [0.0, 50.0, 1.0]]
     points.position_cov = [
-        np.diag([0.01, 0.02, 0.04]).ravel().tolist(),
+        np.diag([0.06, 0.03, 0.14]).ravel().tolist(),
         np.diag([900.0] * 3).ravel().tolist(),
     ]
     out.append((points.time_ns, "LOC_MAP", points))
@@ -315,7 +315,8 @@ def test_space(ride, tmp_path):
     np.testing.assert_allclose(values(stream.of("world/map/points")[0][1].positions), [[5, 0, 1]])
     np.testing.assert_allclose(values(stream.of("world/map/far")[0][1].positions), [[0, 50, 1]])
     _, around = stream.of("world/map/uncertainty")[0]
-    np.testing.assert_allclose(values(around.half_sizes), [3 * np.sqrt([0.01, 0.02, 0.04])], rtol=1e-6)
+    # Less what is shared with the pose, (0.01, 0.04, 0.09): what would be negative has no extent.
+    np.testing.assert_allclose(values(around.half_sizes), [3 * np.sqrt([0, 0.05, 0.05])], atol=1e-6)
     _, camera = stream.of("world/camera")[2]
     np.testing.assert_allclose(values(camera.translation)[0], where(0.2), atol=1e-6)
     np.testing.assert_allclose(values(camera.quaternion)[0], [-0.5, 0.5, -0.5, 0.5])

@@ -10,9 +10,10 @@ It draws LOC_IMAGE with LOC_SLAM_FRAME (features by state, search ellipses of 3 
 LOC_ESTIMATE (pose, way, ellipsoid of the position's uncertainty, deviations, status flags), LOC_MAP, LOC_GPS
 about the origin that LOC_FUSION tells, LOC_REFERENCE, and what LOC_ESTIMATOR_STATUS, LOC_STATISTICS and
 LOC_SOURCE_STATUS say. All ellipsoids hold 3 sigma. Points of the map are green where they are well known and
-red where they are not; one whose 3 sigma are more than half its distance has no ellipsoid. The camera's
-frustum needs --config; it is drawn without distortion, the picture in it as it is. The time line is that of
-the measurements, from the first one on; what has only the host's time (statistics, sources) is put where the
+red where they are not; one whose 3 sigma are more than half its distance has no ellipsoid. Where GPS ties the
+map to the Earth, the uncertainty that it shares with the pose is left out of them. The camera's frustum needs
+--config; it is drawn without distortion, the picture in it as it is. The time line is that of the
+measurements, from the first one on; what has only the host's time (statistics, sources) is put where the
 measurements are by then.
 
 Of estimates --rate-hz a second are drawn; status flags, latency (the worst) and the numbers of each frame
@@ -279,6 +280,8 @@ def _show_live(rr: Any, options: argparse.Namespace, camera: Any | None, interru
         if target.viewer is not None and not target.viewer.running:
             _say("the viewer has ended")
         drawing.finish()
+        _whole(layout, scene)
+        target.stream.send_blueprint(blueprint(rr, layout))
         _report(scene, intake, receiver.counts)
         if not any(name.endswith(".received") for name in intake.counts):
             target.keep_part = False
@@ -306,6 +309,14 @@ def _learn(layout: Layout, scene: Scene, item: Any) -> bool:
             scene.space.set_scale(axis_m)
             return True
     return False
+
+
+def _whole(layout: Layout, scene: Scene) -> None:
+    """For whoever opens the file, and the screenshot: all of it, not the last minute."""
+    layout.follow = False
+    seen = scene.space.extent()
+    if seen is not None:
+        layout.centre, layout.radius = seen
 
 
 def _report(scene: Scene, intake: Intake, more: Counter[str]) -> None:

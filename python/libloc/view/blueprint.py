@@ -63,7 +63,7 @@ def blueprint(rr: Any, layout: Layout) -> Any:
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Horizontal(*top, column_shares=[1, 1] if len(top) == 2 else [1]),
-            rrb.Horizontal(*columns, rrb.Vertical(lanes, rrb.Tabs(words, statistics))),
+            rrb.Horizontal(*columns, rrb.Vertical(lanes, rrb.Tabs(words, statistics), row_shares=[3, 2])),
             row_shares=[3, 2],
         ),
         rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following"),

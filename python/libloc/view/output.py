@@ -151,11 +151,15 @@ class Viewer:
             command += ["--memory-limit", memory, "--server-memory-limit", "64MB", "--hide-welcome-screen"]
         if kind == "headless":
             command += ["--headless", "--window-size", f"{size[0]}x{size[1]}"]
+        environment = os.environ | (
+            {"RUST_LOG": "error"} if kind == "headless" else {}
+        )  # no notes on the picture
         self._said = tempfile.TemporaryFile("w+")  # a pipe that nobody reads would fill up
         self._process = subprocess.Popen(
             command,
             stdout=subprocess.DEVNULL,
             stderr=self._said,
+            env=environment,
             # Ctrl-C is for this program, which ends the viewer when it has sent all.
             start_new_session=True,
         )

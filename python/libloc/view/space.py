@@ -79,12 +79,14 @@ class SpaceDrawing:
         self.camera_from_frames = False
         self._axis_m = 0.0
         self._trail = Trail(LOCAL_TRAJECTORY, _BLUE, 0.9)
+        self._shared_cov = np.zeros((3, 3))  # of all points of a map that GPS has tied to the Earth
         self.tied_ns: int | None = None  #: when the world became another one, tied to north
         self._reference = Trail(REFERENCE, _GREY, 0.7)
         self._origin: Any = None  # libloc.LocalFrame
         self._origin_of: tuple[float, float, float] | None = None
         self._fixes: list[Any] = []
         self._world = ""
+        self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
         self.where: Floats | None = None  #: newest position of the camera, or else of the body
         self.set_scale(axis_m)
 
@@ -130,6 +132,7 @@ class SpaceDrawing:
         if placed:
             self._tie(t, bool(m.valid & EstimateValid.HEADING))
             self._trail.add(out, t, p)
+            self._low, self._high = np.minimum(self._low, p), np.maximum(self._high, p)
         if not self.camera_from_frames:
             self.where = place
             if self.camera is not None and oriented and placed:
@@ -147,6 +150,7 @@ class SpaceDrawing:
             self.tied_ns = time_ns
         self._trail.flush(self.out)
         self._trail = Trail(entity, _BLUE, 0.9)
+        self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
 
     def _sigmas(self, m: Any, q: Floats | None, p: Floats | None) -> tuple[Floats | None, float]:
         dim = m.covariance_dim
@@ -160,6 +164,8 @@ class SpaceDrawing:
         block = cov[3:6, 3:6]
         if p is None or dim < 6 or not np.isfinite(block).all():
             return None, heading
+        if m.valid & EstimateValid.HEADING:
+            self._shared_cov = block
         half, turn = ellipsoids(block[None], SIGMAS)
         self._ellipsoids(m.time_ns, "world/uncertainty", p[None], half, turn, np.array([[*_BLUE, 60]]))
         return np.sqrt(np.maximum(np.diagonal(block), 0)), heading
@@ -176,14 +182,18 @@ class SpaceDrawing:
         self.out.log(m.time_ns, CAMERA, rr.Transform3D(translation=p, quaternion=np.roll(q, -1)))
 
     def map(self, m: Any, time_ns: int | None = None) -> None:
-        """Points of a map_points_t, green where they are well known, red where not; shown from time_ns on."""
+        """Points of a map_points_t, green where they are well known, red where not; shown from time_ns on.
+
+        Where the map as a whole is on the Earth is as uncertain as the pose, whose ellipsoid tells: that is
+        taken out of the points' covariances, which would all look alike otherwise.
+        """
         rr = self.out.rr
         t = m.time_ns if time_ns is None else time_ns
         p = np.array(m.position, dtype=float).reshape(-1, 3)
         cov = np.array(m.position_cov, dtype=float).reshape(-1, 3, 3)
         good = np.isfinite(p).all(axis=1) & np.isfinite(cov).all(axis=(1, 2))
         self.counts["map.not_finite"] += int(np.sum(~good))
-        p, cov = p[good], cov[good]
+        p, cov = p[good], cov[good] - self._shared_cov
         self.counts["maps.drawn"] += 1
         half, turn = ellipsoids(cov, SIGMAS)
         eye = np.zeros(3) if self.where is None else self.where
@@ -265,6 +275,13 @@ class SpaceDrawing:
             return
         self._reference.add(self.out, m.time_ns, self.align(p[None])[0])
         self.counts["reference.drawn"] += 1
+
+    def extent(self) -> tuple[Floats, float] | None:
+        """Centre and radius of the way, with some room for what was seen from it; None when there is none."""
+        if not np.isfinite(self._low).all():
+            return None
+        radius = float(np.linalg.norm(self._high - self._low)) / 2
+        return (self._low + self._high) / 2, max(radius, 5 * self._axis_m)
 
     def finish(self) -> None:
         """Draws what is left; what was never drawn is counted."""
