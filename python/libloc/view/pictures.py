@@ -205,25 +205,19 @@ class PictureDrawing:
         at = np.where(measured[:, None], frame.pixel_px, frame.predicted_px)
         shown = np.isfinite(at).all(axis=1)
         state = frame.state.astype(np.uint16)
-        out.log(
-            frame.time_ns,
-            f"{IMAGE}/features",
-            rr.Points2D(_centred(at[shown]), class_ids=state[shown], radii=rr.Radius.ui_points(3.0)),
-        )
+        entity = f"{IMAGE}/features"
+        out.style(entity, "Points2D", radii=rr.Radius.ui_points(3.0))
+        out.log(frame.time_ns, entity, rr.Points2D(_centred(at[shown]), class_ids=state[shown]))
         rows = frame.with_ellipse
         outlines = _centred(ellipses(frame.predicted_px[rows], frame.innovation_cov[rows], SEARCH_SIGMAS))
-        out.log(
-            frame.time_ns,
-            f"{IMAGE}/search",
-            rr.LineStrips2D(outlines, class_ids=state[rows], radii=rr.Radius.ui_points(0.7)),
-        )
+        entity = f"{IMAGE}/search"
+        out.style(entity, "LineStrips2D", radii=rr.Radius.ui_points(0.7))
+        out.log(frame.time_ns, entity, rr.LineStrips2D(outlines, class_ids=state[rows]))
         rows = measured & np.isfinite(frame.predicted_px).all(axis=1)
         lines = _centred(np.stack([frame.predicted_px[rows], frame.pixel_px[rows]], axis=1))
-        out.log(
-            frame.time_ns,
-            f"{IMAGE}/residuals",
-            rr.LineStrips2D(lines, colors=(255, 255, 255), radii=rr.Radius.ui_points(0.8)),
-        )
+        entity = f"{IMAGE}/residuals"
+        out.style(entity, "LineStrips2D", colors=(255, 255, 255), radii=rr.Radius.ui_points(0.8))
+        out.log(frame.time_ns, entity, rr.LineStrips2D(lines))
 
     def _legend(self, width: int, height: int) -> None:
         """Below the picture, where nothing is."""

@@ -47,6 +47,7 @@ class Recorder:
         self.stream = stream
         self.start_ns = start_ns
         self._rows: dict[str, _Rows] = {}
+        self._styled: set[str] = set()
         # The time at which it was drawn is of no use, and a second time line to choose from confuses.
         stream.set_log_time_enabled(False)
         stream.set_log_tick_enabled(False)
@@ -54,6 +55,12 @@ class Recorder:
     def static(self, entity: str, *what: Any) -> None:
         """Holds at all times; replaces what was said before."""
         self.stream.log(entity, *what, static=True)
+
+    def style(self, entity: str, kind: str, **what: Any) -> None:
+        """Fields of an archetype (Points2D, ...) that never change: cheaper than with every log()."""
+        if entity not in self._styled:
+            self._styled.add(entity)
+            self.static(entity, getattr(self.rr, kind).from_fields(**what))
 
     def log(self, time_ns: int, entity: str, *what: Any) -> None:
         if self.start_ns is None:

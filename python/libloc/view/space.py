@@ -63,8 +63,10 @@ class Trail:
         if len(self.points) > 1:
             rr = out.rr
             strip = np.array(self.points, dtype=np.float32)
-            line = rr.LineStrips3D([strip], colors=[self.colour], radii=rr.Radius.ui_points(self.radius))
-            out.log(self.last_ns, self.entity, line)
+            out.style(
+                self.entity, "LineStrips3D", colors=[self.colour], radii=rr.Radius.ui_points(self.radius)
+            )
+            out.log(self.last_ns, self.entity, rr.LineStrips3D([strip]))
             self.points = [self.points[-1]]
             self.begin_ns = self.last_ns
 
@@ -167,7 +169,7 @@ class SpaceDrawing:
         if m.valid & EstimateValid.HEADING:
             self._shared_cov = block
         half, turn = ellipsoids(block[None], SIGMAS)
-        self._ellipsoids(m.time_ns, "world/uncertainty", p[None], half, turn, np.array([[*_BLUE, 60]]))
+        self._ellipsoids(m.time_ns, "world/uncertainty", p[None], half, turn, [(*_BLUE, 60)])
         return np.sqrt(np.maximum(np.diagonal(block), 0)), heading
 
     def frame(self, m: Any) -> None:
@@ -199,27 +201,20 @@ class SpaceDrawing:
         eye = np.zeros(3) if self.where is None else self.where
         share = half[:, -1] / np.maximum(np.linalg.norm(p - eye, axis=1), 1e-9) if len(p) else np.zeros(0)
         colours = _colours(share)
-        radii = rr.Radius.ui_points(2.5)
         near = share < _FAR
-        self.out.log(t, "world/map/points", rr.Points3D(p[near], colors=colours[near], radii=radii))
-        self.out.log(t, "world/map/far", rr.Points3D(p[~near], colors=colours[~near], radii=radii))
-        shade = np.column_stack([colours[near], np.full(near.sum(), 70)])
+        for name, rows in (("points", near), ("far", ~near)):
+            points = rr.Points3D(p[rows], colors=colours[rows], radii=rr.Radius.ui_points(2.5))
+            self.out.log(t, f"world/map/{name}", points)
+        shade = np.column_stack([colours[near], np.full(near.sum(), 70, dtype=np.uint8)])
         self._ellipsoids(t, "world/map/uncertainty", p[near], half[near], turn[near], shade)
 
     def _ellipsoids(
         self, t: int, entity: str, centres: Floats, half: Floats, turn: Floats, colours: Any
     ) -> None:
-        self.out.log(
-            t,
-            entity,
-            self.out.rr.Ellipsoids3D(
-                centers=centres,
-                half_sizes=half,
-                quaternions=turn,
-                colors=np.asarray(colours, dtype=np.uint8),
-                fill_mode="majorwireframe",
-            ),
-        )
+        rr = self.out.rr
+        self.out.style(entity, "Ellipsoids3D", fill_mode="majorwireframe")
+        shown = rr.Ellipsoids3D(centers=centres, half_sizes=half, quaternions=turn, colors=colours)
+        self.out.log(t, entity, shown)
 
     def fusion(self, m: Any) -> None:
         origin = (m.origin_latitude, m.origin_longitude, m.origin_altitude)
@@ -258,12 +253,13 @@ class SpaceDrawing:
             self.counts["gps.not_on_earth"] += 1
             return
         rr = self.out.rr
-        self.out.log(m.time_ns, GPS, rr.Points3D([p], colors=[_ORANGE], radii=rr.Radius.ui_points(3.0)))
+        self.out.style(GPS, "Points3D", colors=[_ORANGE], radii=rr.Radius.ui_points(3.0))
+        self.out.log(m.time_ns, GPS, rr.Points3D([p]))
         self.counts["gps.drawn"] += 1
         cov = np.array(m.position_cov, dtype=float)
         if np.isfinite(cov).all():
             half, turn = ellipsoids(cov[None], SIGMAS)
-            self._ellipsoids(m.time_ns, f"{GPS}/uncertainty", p[None], half, turn, np.array([[*_ORANGE, 40]]))
+            self._ellipsoids(m.time_ns, f"{GPS}/uncertainty", p[None], half, turn, [(*_ORANGE, 40)])
 
     def reference(self, m: Any) -> None:
         p = np.array(m.position, dtype=float)
