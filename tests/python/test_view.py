@@ -587,6 +587,17 @@ def test_pictures_and_frames_meet_in_any_order():
     matcher.finish()
     assert met[4:] == [(None, 5)]
 
+    # Pictures that were dropped do not take away the frames of later ones.
+    met.clear()
+    for i in range(10, 71):
+        features(i)
+    assert met == [(None, i) for i in range(10, 41)]
+    picture(70)
+    assert met[-1] == (70, 70)
+    picture(80)
+    picture(80)  # begun anew
+    assert met[-1] == (80, None)
+
     # Where nothing finds features, only the first picture waits.
     met.clear()
     matcher = live.LivePictures(lambda m, f: met.append((m and m.sequence, f and f.sequence)), 0)

@@ -34,6 +34,9 @@ class LivePictures:
         if frame is not None:
             self._draw(m, frame)
         else:
+            before = self._pictures.pop((m.camera, m.sequence), None)
+            if before is not None:  # the source has begun anew
+                self._draw(before[0], None)
             self._pictures[m.camera, m.sequence] = (m, now_s)
 
     def frame(self, frame: Features, now_s: float) -> None:
@@ -41,7 +44,7 @@ class LivePictures:
         if (frame.camera, frame.sequence) not in self._pictures:
             self._frames.add(frame)
             if len(self._frames) > _WAITING_FRAMES:
-                for old in self._frames.rest():
+                for old in self._frames.rest(keep=_WAITING_FRAMES // 2):
                     self._draw(None, old)
             return
         m, _ = self._pictures.pop((frame.camera, frame.sequence))

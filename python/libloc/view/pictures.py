@@ -136,11 +136,15 @@ class Frames:
             del self._frames[key]
         return best
 
-    def rest(self) -> list[Features]:
-        """All that no picture has asked for, in the order of time."""
+    def rest(self, keep: int = 0) -> list[Features]:
+        """Takes out what no picture has asked for, but for the newest keep; in the order of time."""
         frames = [frame for frames in self._frames.values() for frame in frames]
+        frames.sort(key=lambda frame: frame.time_ns)
         self._frames.clear()
-        return sorted(frames, key=lambda frame: frame.time_ns)
+        split = max(len(frames) - keep, 0)
+        for frame in frames[split:]:
+            self.add(frame)
+        return frames[:split]
 
 
 class PictureDrawing:
