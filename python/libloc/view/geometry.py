@@ -20,7 +20,7 @@ def ellipses(centres: Floats, covariances: Floats, sigmas: float) -> NDArray[np.
     axes = vectors * (sigmas * np.sqrt(np.maximum(values, 0)))[:, None, :]
     angle = np.linspace(0, 2 * np.pi, _CIRCLE_POINTS + 1)
     circle = np.stack([np.cos(angle), np.sin(angle)])
-    return (centres[:, None, :] + np.swapaxes(axes @ circle, 1, 2)).astype(np.float32)
+    return np.asarray(centres[:, None, :] + np.swapaxes(axes @ circle, 1, 2), dtype=np.float32)
 
 
 def ellipsoids(covariances: Floats, sigmas: float) -> tuple[Floats, Floats]:

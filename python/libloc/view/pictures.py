@@ -205,7 +205,7 @@ class PictureDrawing:
         if self.size_px is not None and self.size_px != self._legend_px:
             self._legend_px = self.size_px
             self._legend(*self.size_px)
-        measured = np.isfinite(frame.pixel_px).all(axis=1)
+        measured = np.asarray(np.isfinite(frame.pixel_px).all(axis=1))
         at = np.where(measured[:, None], frame.pixel_px, frame.predicted_px)
         shown = np.isfinite(at).all(axis=1)
         state = frame.state.astype(np.uint16)
@@ -217,7 +217,7 @@ class PictureDrawing:
         entity = f"{IMAGE}/search"
         out.style(entity, "LineStrips2D", radii=rr.Radius.ui_points(0.7))
         out.log(frame.time_ns, entity, rr.LineStrips2D(outlines, class_ids=state[rows]))
-        rows = measured & np.isfinite(frame.predicted_px).all(axis=1)
+        rows = np.asarray(measured & np.isfinite(frame.predicted_px).all(axis=1))
         lines = _centred(np.stack([frame.predicted_px[rows], frame.pixel_px[rows]], axis=1))
         entity = f"{IMAGE}/residuals"
         out.style(entity, "LineStrips2D", colors=(255, 255, 255), radii=rr.Radius.ui_points(0.8))
