@@ -242,7 +242,8 @@ int show_logs(const Arguments& arguments) {
   }
   if (arguments.window() && !interrupted && recorder.time_ns() != loc::kNoTime) {
     output.show(recorder.scene());
-    while (output.open() && loc::sleep_for(redraw_ns)) output.show(recorder.scene());
+    while (output.open() && loc::sleep_for(redraw_ns)) {  // until the user has seen enough
+    }
   }
   return finish(recorder, output, source);
 }

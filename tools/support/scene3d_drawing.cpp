@@ -38,7 +38,7 @@ const TColor kCamera(20, 20, 20);
 const TColor kText(40, 40, 40);
 constexpr double kSigmas = 3;
 constexpr double kTracePerView = 1.0 / 700;  // distance between the dots of a track, of what the view spans
-constexpr std::size_t kMaxDots = 40'000;
+constexpr double kMaxDots = 20'000;          // of a track
 
 mrpt::math::TPoint3D point_of(const Eigen::Vector3d& p) {
   return {p.x(), p.y(), p.z()};
@@ -56,15 +56,18 @@ void add_dot(CPointCloudColoured& cloud, const Eigen::Vector3d& p, const TColor&
 
 // Lines are one pixel wide everywhere: a track is a row of dots that touch.
 void draw_track(CPointCloudColoured& cloud, const std::vector<TrackPoint>& track, const TColor& colour,
-                double spacing) {
+                double least_spacing) {
+  double length = 0;
+  for (std::size_t i = 1; i < track.size(); ++i) {
+    if (!track[i].begins) length += (track[i].position - track[i - 1].position).norm();
+  }
+  const double spacing = std::max(least_spacing, length / kMaxDots);
   for (std::size_t i = 0; i < track.size(); ++i) {
     const TColor& c = track[i].doubtful ? kDoubtful : colour;
     if (i > 0 && !track[i].begins) {
       const Eigen::Vector3d step = track[i].position - track[i - 1].position;
-      const double pieces = std::min(std::ceil(step.norm() / spacing), 500.0);
-      for (double k = 1; k < pieces && cloud.size() < kMaxDots; ++k) {
-        add_dot(cloud, track[i - 1].position + k / pieces * step, c);
-      }
+      const double pieces = std::ceil(step.norm() / spacing);
+      for (double k = 1; k < pieces; ++k) add_dot(cloud, track[i - 1].position + k / pieces * step, c);
     }
     add_dot(cloud, track[i].position, c);
   }

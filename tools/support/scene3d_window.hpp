@@ -16,8 +16,7 @@ class SceneWindow {
   SceneWindow& operator=(const SceneWindow&) = delete;
   ~SceneWindow();
 
-  /// @param view how it is looked at: kFollow is kept up, the others are where the mouse starts from, as soon as there
-  /// is something to see
+  /// @param view from where it is looked at, until the user moves the mouse
   void show(const Scene3d& scene, const SceneView& view);
   /// False once the user has closed it.
   bool open() const;
