@@ -29,7 +29,6 @@ TEST(DecodeMessage, gives_back_every_type_of_the_package) {
   check(test::estimate_message());
   check(test::tracks_message());
   check(test::map_points_message());
-  check(test::estimator_status_message());
   check(test::statistics_message());
   check(test::source_status_message());
   check(test::estimator_status_message());
@@ -59,7 +58,6 @@ TEST(DecodeMessage, refuses_a_message_cut_at_any_byte_or_with_a_byte_too_many) {
   expect_cut_or_longer_is_refused(test::estimate_message());
   expect_cut_or_longer_is_refused(test::tracks_message());
   expect_cut_or_longer_is_refused(test::map_points_message());
-  expect_cut_or_longer_is_refused(test::estimator_status_message());
   expect_cut_or_longer_is_refused(test::statistics_message());
   expect_cut_or_longer_is_refused(test::source_status_message());
   expect_cut_or_longer_is_refused(test::estimator_status_message());

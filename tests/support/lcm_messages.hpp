@@ -124,14 +124,6 @@ inline map_points_t map_points_message() {
   m.position_cov = {{1, 0, 0, 0, 1, 0, 0, 0, 1}};
   return m;
 }
-inline estimator_status_t estimator_status_message() {
-  estimator_status_t m{};
-  m.method = "inertial-slam";
-  m.size = 1;
-  m.condition = {"no GPS"};
-  m.since_s = {3};
-  return m;
-}
 inline statistics_t statistics_message() {
   statistics_t m{};
   m.program = "loc-driver";

@@ -344,6 +344,22 @@ TEST(SceneRecorder, GpsIsWhereItIsOnceTheWorldIsTiedToTheEarth) {
   EXPECT_EQ(recorder.undecodable(), 1);
 }
 
+TEST(SceneRecorder, WhatIsOlderComesIntoTheWorldThatGpsGives) {
+  const Pose3 T_world_map{Eigen::Quaterniond(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ())), {300, -50, 4}};
+  SceneRecorder recorder = recorder_of_ride(0.4);
+  Estimate e = from_message(Ride::estimate(10.005));
+  e.q_world_body = T_world_map.rotation * e.q_world_body;
+  e.position = T_world_map * Ride::place(10);
+  e.origin = {0.7, 0.1, 100};
+  recorder.take("LOC_ESTIMATE", encode(to_message(e, "inertial-slam", "ENU")));
+  recorder.take("LOC_FUSION", encode(*to_fusion_message(e)));
+  const Scene3d scene = recorder.scene();
+  EXPECT_NEAR((scene.trajectory.front().position - T_world_map.translation).norm(), 0, 1e-9);
+  EXPECT_NEAR((scene.gps.front() - T_world_map.translation).norm(), 0, 1e-3);
+  ASSERT_TRUE(scene.points[0].ray);
+  EXPECT_NEAR((scene.points[0].ray->anchor - T_world_map.translation).norm(), 0, 1e-9);
+}
+
 TEST(SceneRecorder, AConvertedFeatureIsAPoint) {
   SceneRecorder recorder = recorder_of_ride();
   recorder.take("LOC_SLAM_FRAME", encode(Ride::frame(10, SlamFeatureState::kMeasured, true)));
@@ -356,7 +372,7 @@ TEST(SceneRecorder, WordsOfTheStatusAreShown) {
   estimator_status_t status = estimator_status_message();
   status.measurement_time_ns = kStart + 10 * kSecond;
   recorder.take("LOC_ESTIMATOR_STATUS", encode(status));
-  EXPECT_EQ(recorder.scene().warnings, std::vector<std::string>{"no GPS"});
+  EXPECT_EQ(recorder.scene().warnings, status.condition);
 }
 
 TEST(SceneRecorder, RubbishIsCountedAndMemoryBounded) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <exception>
 #include <set>
+#include <utility>
 
 #include "libloc/core/check.hpp"
 #include "libloc/geometry/alignment.hpp"
@@ -109,13 +110,7 @@ void SceneRecorder::take(std::string_view channel, std::span<const std::uint8_t>
     } else if (channel == kMapChannel) {
       take_map(data);
     } else if (channel == kFusionChannel) {
-      const auto m = decode_message<fusion_t>(data);
-      const GeodeticPoint origin{m.origin_latitude, m.origin_longitude, m.origin_altitude};
-      origin_.reset();
-      if (std::isfinite(origin.latitude + origin.longitude + origin.altitude)) {
-        origin.check();
-        origin_ = origin;
-      }
+      take_fusion(data);
     } else if (channel == kEstimatorStatusChannel) {
       const auto m = decode_message<estimator_status_t>(data);
       conditions_ = m.condition;
@@ -145,7 +140,12 @@ void SceneRecorder::advance(TimeNs time_ns) {
 
 void SceneRecorder::take_estimate(std::span<const std::uint8_t> data) {
   const auto message = decode_message<estimate_t>(data);
-  estimate_ = from_message(message);
+  const Estimate before = std::exchange(estimate_, from_message(message));
+  pose_before_.reset();
+  if ((before.valid & kValidPosition) != 0 && before.q_world_body.coeffs().allFinite() && before.position.allFinite()) {
+    pose_before_ = Pose3{before.q_world_body, before.position};
+  }
+  unknown_scale_before_ = (before.status & kScaleUnknown) != 0;
   method_ = message.method;
   ++counts_["estimates"];
   advance(estimate_.time_ns);
@@ -153,6 +153,33 @@ void SceneRecorder::take_estimate(std::span<const std::uint8_t> data) {
   trajectory_.add({estimate_.time_ns, estimate_.position, (estimate_.status & kReinitialised) != 0,
                    (estimate_.status & kLost) != 0},
                   options_.max_track_points);
+}
+
+void SceneRecorder::take_fusion(std::span<const std::uint8_t> data) {
+  const auto m = decode_message<fusion_t>(data);
+  const GeodeticPoint origin{m.origin_latitude, m.origin_longitude, m.origin_altitude};
+  if (!std::isfinite(origin.latitude + origin.longitude + origin.altitude)) {
+    origin_.reset();
+    return;
+  }
+  origin.check();
+  const bool first = !origin_;
+  origin_ = origin;
+  if (!first || trajectory_.points.empty()) return;
+  const bool metric = (estimate_.status & kScaleUnknown) == 0 && !unknown_scale_before_;
+  if (metric && pose_before_ && estimate_.q_world_body.coeffs().allFinite() && estimate_.position.allFinite()) {
+    move_into_world(Pose3{estimate_.q_world_body, estimate_.position} * pose_before_->inverse());
+  } else {
+    trajectory_.points.clear();
+    anchors_.clear();
+  }
+}
+
+void SceneRecorder::move_into_world(const Pose3& T_world_map) {
+  for (TrackPoint& p : trajectory_.points) {
+    if (p.time_ns < estimate_.time_ns) p.position = T_world_map * p.position;
+  }
+  for (auto& [id, anchor] : anchors_) anchor = T_world_map * anchor;
 }
 
 void SceneRecorder::take_frame(std::span<const std::uint8_t> data) {

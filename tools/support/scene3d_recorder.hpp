@@ -2,7 +2,8 @@
 // come and says at any moment what the scene is. Its memory is bounded: long tracks are thinned out.
 // Where the estimates are tied to the Earth (fusion_t), GPS fixes are drawn where they are. Otherwise they, and the
 // reference always (its world is another one), are laid over the trajectory: turned about the vertical and shifted,
-// with a scale when the estimator does not know metres.
+// with a scale when the estimator does not know metres. Once GPS has tied a map to the Earth, estimates are in another
+// world than before: what is older is taken there by the two poses around that moment, or left out without metres.
 #pragma once
 
 #include <cstdint>
@@ -60,6 +61,8 @@ class SceneRecorder {
   };
 
   void take_estimate(std::span<const std::uint8_t> data);
+  void take_fusion(std::span<const std::uint8_t> data);
+  void move_into_world(const Pose3& T_world_map);
   void take_frame(std::span<const std::uint8_t> data);
   void take_map(std::span<const std::uint8_t> data);
   void take_measurement(std::string_view channel, std::span<const std::uint8_t> data, TimeNs receive_time_ns);
@@ -76,6 +79,8 @@ class SceneRecorder {
   TimeNs time_ns_ = kNoTime;
   TimeNs first_time_ns_ = kNoTime;
   Estimate estimate_;
+  std::optional<Pose3> pose_before_;  // of the estimate before that one
+  bool unknown_scale_before_ = false;
   std::string method_;
   std::optional<GeodeticPoint> origin_;
   std::optional<SlamFrame> frame_;

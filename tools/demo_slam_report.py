@@ -1,0 +1,456 @@
+"""What tools/demo shows of SLAM from pictures: live and replayed run are the same, errors against the truth, and
+one picture that sums up the run.
+
+    demo_slam_report.py --live live.log --replay replay.log --picture summary.png --title TEXT
+
+The logs hold the LCM types of msgs/ (Python package `loc`). The truth is LOC_REFERENCE in the log, or a TUM file
+(poses of the body). Exit code 1 when the runs differ, pictures were lost, or there is nothing to compare with.
+"""
+
+import argparse
+import io
+import re
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import loc
+import matplotlib.pyplot as plt
+import numpy as np
+from lcm import EventLog
+from PIL import Image
+
+SHOWN_PICTURES = 3
+# What became of a feature: bits of slam_frame_t, with colours that colour-blind readers tell apart.
+STATES = (
+    ((loc.slam_frame_t.STATE_MEASURED, loc.slam_frame_t.STATE_RESCUED), "used", "tab:cyan"),
+    ((loc.slam_frame_t.STATE_NEW,), "new in the map", "yellow"),
+    ((loc.slam_frame_t.STATE_REJECTED,), "not believed", "red"),
+    ((loc.slam_frame_t.STATE_PREDICTED,), "expected, not used", "tab:orange"),
+)
+EARTH_RADIUS_M = 6_378_137.0
+MOVING_M_S = 0.03  # a truth that is slower stands still
+MAX_GAP_NS = 100_000_000
+
+
+class ReportError(RuntimeError):
+    pass
+
+
+@dataclass
+class Track:
+    """Poses over time; q_wxyz takes body (or camera) to world."""
+
+    time_ns: list[int] = field(default_factory=list)
+    position: list = field(default_factory=list)
+    q_wxyz: list = field(default_factory=list)
+
+    def add(self, time_ns, position, q_wxyz) -> None:
+        self.time_ns.append(time_ns)
+        self.position.append(position)
+        self.q_wxyz.append(q_wxyz)
+
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return (
+            np.array(self.time_ns, dtype=np.int64),
+            np.array(self.position, dtype=float).reshape(-1, 3),
+            np.array(self.q_wxyz, dtype=float).reshape(-1, 4),
+        )
+
+
+@dataclass
+class Run:
+    method: str = ""
+    body: Track = field(default_factory=Track)
+    camera: Track = field(default_factory=Track)
+    truth: Track = field(default_factory=Track)
+    fixes: list = field(default_factory=list)  # time, latitude, longitude [rad], altitude [m]
+    origin: tuple | None = None  # of world on the Earth: latitude, longitude, altitude
+    anchored_ns: int | None = None  # since when
+    frames: list = field(default_factory=list)  # slam_frame_t
+    pictures: list = field(default_factory=list)  # LOC_IMAGE of camera 0, not decoded: its number and bytes
+    map_points: object = None  # the last map_points_t
+    conditions: dict = field(default_factory=dict)  # word: number of messages
+    same: list = field(default_factory=list)  # bytes that must be those of another run
+    published: int | None = None  # pictures, as the driver says
+    latency_ms: dict = field(default_factory=dict)
+
+    def seconds(self, time_ns) -> np.ndarray:
+        return (np.asarray(time_ns) - self.frames[0].time_ns) * 1e-9
+
+
+def read(path: Path) -> Run:
+    run = Run()
+    for event in EventLog(str(path), "r"):
+        if event.channel == "LOC_ESTIMATE":
+            # Fingerprint, time_ns, host_time_ns, sequence, publish_time_ns: 8 bytes each, then the rest.
+            run.same.append(event.data[:16] + event.data[24:32] + event.data[40:])
+            message = loc.estimate_t.decode(event.data)
+            run.method = message.method
+            if message.valid & message.VALID_POSITION:
+                run.body.add(message.time_ns, message.position, message.q_world_body_wxyz)
+        elif event.channel == "LOC_SLAM_FRAME":
+            frame = loc.slam_frame_t.decode(event.data)
+            run.frames.append(frame)
+            if np.isfinite(frame.camera_position).all():
+                run.camera.add(frame.time_ns, frame.camera_position, frame.q_world_camera_wxyz)
+        elif event.channel == "LOC_REFERENCE":
+            message = loc.reference_t.decode(event.data)
+            if message.score and np.isfinite(message.position).all():
+                run.truth.add(message.time_ns, message.position, message.q_world_body_wxyz)
+        elif event.channel == "LOC_GPS":
+            fix = loc.gps_fix_t.decode(event.data)
+            if fix.fix_type >= fix.FIX_2D:
+                run.fixes.append((fix.time_ns, fix.latitude, fix.longitude, fix.altitude))
+        elif event.channel == "LOC_FUSION":
+            message = loc.fusion_t.decode(event.data)
+            place = (message.origin_latitude, message.origin_longitude, message.origin_altitude)
+            if np.isfinite(place).all():
+                run.anchored_ns = message.time_ns if run.origin is None else run.anchored_ns
+                run.origin = place
+        elif event.channel == "LOC_MAP":
+            run.map_points = loc.map_points_t.decode(event.data)
+        elif event.channel == "LOC_IMAGE":
+            # Fingerprint, time_ns, host_time_ns, sequence, exposure_ns: 8 bytes each, then the camera's number.
+            if int.from_bytes(event.data[40:44], "big") == 0:
+                run.pictures.append((int.from_bytes(event.data[24:32], "big"), event.data))
+        elif event.channel == "LOC_ESTIMATOR_STATUS":
+            for word in loc.estimator_status_t.decode(event.data).condition:
+                run.conditions[word] = run.conditions.get(word, 0) + 1
+        elif event.channel == "LOC_SOURCE_STATUS":
+            message = loc.source_status_t.decode(event.data)
+            run.published = dict(zip(message.stream_name, message.published, strict=True)).get("image")
+        elif event.channel == "LOC_STATISTICS":
+            message = loc.statistics_t.decode(event.data)
+            if message.program == "loc-estimator":
+                values = dict(zip(message.name, message.value, strict=True))
+                run.latency_ms = {k: v for k, v in values.items() if k.startswith("latency")}
+    if not run.frames:
+        raise ReportError(f"{path}: no frame of SLAM in it")
+    return run
+
+
+def check_replay(live: Run, replay: Run) -> str:
+    """Same estimates, bit for bit, and no picture lost. Returns a sentence for the user."""
+    if live.published is not None and len(live.pictures) != live.published:
+        raise ReportError(f"the driver sent {live.published} pictures, {len(live.pictures)} were logged")
+    for name, run in (("live", live), ("the replay", replay)):
+        if len(run.frames) != len(live.pictures):
+            raise ReportError(
+                f"{name}: {len(run.frames)} of {len(live.pictures)} pictures reached the filter: the machine is busy"
+            )
+    if len(live.same) != len(replay.same):
+        raise ReportError(f"{len(live.same)} estimates live, {len(replay.same)} replayed: must be equal")
+    for index, (first, second) in enumerate(zip(live.same, replay.same, strict=True)):
+        if first != second:
+            raise ReportError(f"estimate {index} of the replay differs from the live one")
+    return (
+        f"replay: all {len(live.same)} estimates are the live ones bit for bit"
+        f" ({len(live.pictures)} pictures, none lost)"
+    )
+
+
+def rotate(q_wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    w, v = q_wxyz[:, :1], q_wxyz[:, 1:]
+    cross = np.cross(v, np.broadcast_to(vector, v.shape))
+    return vector + 2 * (w * cross + np.cross(v, cross))
+
+
+def read_tum(path: Path) -> Track:
+    track = Track()
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        if not line.strip() or line.startswith("#"):
+            continue
+        words = line.split()
+        if len(words) != 8:
+            raise ReportError(f"{path}:{number}: {len(words)} columns, must be 8")
+        t, x, y, z, qx, qy, qz, qw = (float(word) for word in words)
+        track.add(round(t * 1e9), (x, y, z), (qw, qx, qy, qz))
+    return track
+
+
+def camera_in_body(path: Path) -> np.ndarray:
+    """Where the camera is in the body: the last column of T_BS in a sensor.yaml of EuRoC."""
+    found = re.search(r"T_BS:.*?data:\s*\[([^\]]*)\]", path.read_text(), re.DOTALL)
+    values = [] if found is None else [float(x) for x in found.group(1).split(",")]
+    if len(values) != 16:
+        raise ReportError(f"{path}: no T_BS with 16 numbers")
+    return np.array([values[3], values[7], values[11]])
+
+
+def at_times(known_ns, position: np.ndarray, time_ns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions at other times (linear), and where there are samples on both sides."""
+    after = np.clip(np.searchsorted(known_ns, time_ns), 1, len(known_ns) - 1)
+    t0, t1 = known_ns[after - 1], known_ns[after]
+    inside = (time_ns >= t0) & (time_ns <= t1) & (t1 - t0 <= MAX_GAP_NS)
+    part = ((time_ns - t0) / np.maximum(t1 - t0, 1))[:, None]
+    return (1 - part) * position[after - 1] + part * position[after], inside
+
+
+@dataclass
+class Alignment:
+    """to = scale R from + shift, in the least-squares sense (Umeyama 1991; upright: R is a turn about z)."""
+
+    scale: float
+    R: np.ndarray
+    shift: np.ndarray
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        return self.scale * points @ self.R.T + self.shift
+
+
+def align(source: np.ndarray, target: np.ndarray, metric: bool) -> Alignment:
+    a, b = source - source.mean(axis=0), target - target.mean(axis=0)
+    if metric:  # gravity is known: heading and place are free
+        sine = np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+        angle = np.arctan2(sine, np.sum(a[:, :2] * b[:, :2]))
+        c, s = np.cos(angle), np.sin(angle)
+        R, scale = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), 1.0
+    else:
+        u, d, vt = np.linalg.svd(b.T @ a)
+        sign = np.array([1, 1, np.linalg.det(u) * np.linalg.det(vt)])
+        R = (u * sign) @ vt
+        scale = float(np.sum(d * sign) / np.sum(a**2))
+    return Alignment(scale, R, target.mean(axis=0) - scale * R @ source.mean(axis=0))
+
+
+def rms(errors: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.sum(errors**2, axis=1))))
+
+
+@dataclass
+class Comparison:
+    time_ns: np.ndarray
+    estimate: np.ndarray  # aligned with the truth [m]
+    truth: np.ndarray
+    alignment: Alignment  # of the estimates' world with that of the truth
+    moving: np.ndarray
+
+    @property
+    def error(self) -> np.ndarray:
+        return np.linalg.norm(self.estimate - self.truth, axis=1)
+
+
+def compare(run: Run, truth: Track, arm: np.ndarray, metric: bool) -> Comparison:
+    """The body with an IMU; camera centres without one (an arm in metres does not fit lengths without a unit)."""
+    if len(truth.time_ns) < 2:
+        raise ReportError("no truth to compare with")
+    time_ns, position, _ = (run.body if metric else run.camera).arrays()
+    if run.anchored_ns is not None:  # before, the world was another one
+        time_ns, position = time_ns[time_ns >= run.anchored_ns], position[time_ns >= run.anchored_ns]
+    truth_ns, truth_position, q_wxyz = truth.arrays()
+    if not metric:
+        truth_position = truth_position + rotate(q_wxyz, arm)
+    wanted, inside = at_times(truth_ns, truth_position, time_ns)
+    time_ns, position, wanted = time_ns[inside], position[inside], wanted[inside]
+    if len(time_ns) < 10:
+        raise ReportError(f"{len(time_ns)} estimates at times of the truth: too few to compare")
+    speed = np.linalg.norm(np.gradient(wanted, axis=0), axis=1) / np.gradient(time_ns * 1e-9)
+    width = max(1, round(0.5e9 / np.median(np.diff(time_ns))))
+    moving = np.convolve(speed, np.ones(width) / width, mode="same") > MOVING_M_S
+    fitted = moving if moving.sum() > 10 else np.ones_like(moving)
+    alignment = align(position[fitted], wanted[fitted], metric)
+    return Comparison(time_ns, alignment(position), wanted, alignment, moving)
+
+
+def fixes_in_world(run: Run) -> np.ndarray:
+    """East, north, up of the world's origin, or of the first fix; good to centimetres within a kilometre."""
+    fixes = np.array(run.fixes)[:, 1:]
+    latitude, longitude, altitude = fixes[0] if run.origin is None else run.origin
+    east = (fixes[:, 1] - longitude) * np.cos(latitude) * EARTH_RADIUS_M
+    flattening = 1 / 298.257223563
+    e2 = flattening * (2 - flattening)
+    w = 1 - e2 * np.sin(latitude) ** 2
+    meridian = EARTH_RADIUS_M * (1 - e2) / w**1.5
+    return np.column_stack([east / np.sqrt(w), (fixes[:, 0] - latitude) * meridian, fixes[:, 2] - altitude])
+
+
+def decode(data: bytes) -> np.ndarray:
+    message = loc.image_t.decode(data)
+    if message.pixelformat == message.PIXEL_FORMAT_MJPEG:
+        return np.asarray(Image.open(io.BytesIO(message.data)).convert("L"))
+    channels = 1 if message.pixelformat == message.PIXEL_FORMAT_GRAY else 3
+    rows = np.frombuffer(message.data, np.uint8).reshape(message.height, message.row_stride)
+    rows = rows[:, : message.width * channels]
+    return rows if channels == 1 else rows.reshape(message.height, message.width, 3)[..., 1]
+
+
+def draw_picture(axes, run: Run, index: int) -> None:
+    frame = run.frames[index]
+    data = next((data for number, data in run.pictures if number == frame.sequence), None)
+    if data is not None:
+        axes.imshow(decode(data), cmap="gray", vmin=0, vmax=255)
+    state = np.frombuffer(bytes(x & 0xFF for x in frame.feature_state), np.int8)
+    measured = np.column_stack([frame.u_px, frame.v_px]).reshape(-1, 2)
+    at = np.where(
+        np.isfinite(measured),
+        measured,
+        np.column_stack([frame.predicted_u_px, frame.predicted_v_px]).reshape(-1, 2),
+    )
+    for values, label, colour in STATES:
+        rows = np.isin(state, values)
+        axes.scatter(*at[rows].T, s=22, facecolors="none", edgecolors=colour, lw=1.1, label=label)
+    axes.set(xticks=[], yticks=[])
+    axes.set_title(
+        f"{run.seconds(frame.time_ns):.1f} s: {frame.measured} of {frame.visible} features used", fontsize=10
+    )
+
+
+def known_points(run: Run) -> np.ndarray:
+    """Of the last map, those whose deviation is below 30 % of their distance."""
+    if run.map_points is None or run.map_points.size == 0:
+        return np.zeros((0, 3))
+    points = np.array(run.map_points.position)
+    covariance = np.array(run.map_points.position_cov).reshape(-1, 3, 3)
+    sigma = np.sqrt(np.trace(covariance, axis1=1, axis2=2))
+    return points[sigma < 0.3 * np.linalg.norm(points - run.camera.position[-1], axis=1)]
+
+
+def draw_from_above(axes, run: Run, comparison: Comparison) -> None:
+    axes.plot(*comparison.truth[:, :2].T, color="0.65", lw=4, label="truth")
+    axes.plot(*comparison.estimate[:, :2].T, color="tab:blue", lw=1.3, label="estimate")
+    low, high = comparison.truth.min(axis=0), comparison.truth.max(axis=0)
+    if run.fixes and run.origin is not None:
+        fixes = comparison.alignment(fixes_in_world(run))
+        axes.plot(*fixes[:, :2].T, ".", color="tab:orange", ms=3, label="GPS", zorder=1)
+    points = comparison.alignment(known_points(run))
+    reach = 0.5 * max(high - low)  # what is farther away would set the scale
+    near = np.all((points > low - reach) & (points < high + reach), axis=1)
+    if near.any():
+        axes.plot(*points[near, :2].T, ".", color="tab:purple", ms=3, label="map, points known to 30 %")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set(xlabel="x [m]", ylabel="y [m]")
+    axes.legend(fontsize=8, loc="best")
+    axes.set_title("from above", fontsize=10)
+    axes.grid(alpha=0.3)
+
+
+def draw_over_time(axes, run: Run, comparison: Comparison) -> None:
+    t = run.seconds(comparison.time_ns)
+    axes[0].plot(t, 100 * comparison.error, color="tab:red", lw=1)
+    axes[0].set(ylabel="error [cm]", ylim=(0, None))
+    frame_t = run.seconds([frame.time_ns for frame in run.frames])
+    for name, label, colour in (
+        ("map_size", "in the map", "k"),
+        ("measured", "used", "tab:blue"),
+        ("rejected", "not believed", "tab:red"),
+    ):
+        axes[1].plot(
+            frame_t, [getattr(frame, name) for frame in run.frames], color=colour, lw=0.9, label=label
+        )
+    axes[1].set(ylabel="features", ylim=(0, None))
+    axes[1].legend(fontsize=8, ncols=3, loc="upper left")
+    spent = 1e3 * np.array([frame.time_spent_s for frame in run.frames])
+    axes[2].plot(frame_t, spent, color="tab:green", lw=0.8)
+    axes[2].set(ylabel="filter [ms]", xlabel="time [s]", ylim=(0, 1.2 * np.percentile(spent, 99.5)))
+    for axis in axes:
+        axis.grid(alpha=0.3)
+        axis.margins(x=0.01)
+
+
+def sums(run: Run, comparison: Comparison, metric: bool) -> list[tuple[str, str]]:
+    moving, error = comparison.moving, comparison.error
+    way = np.linalg.norm(np.diff(comparison.truth[:: max(1, len(error) // 500)], axis=0), axis=1).sum()
+    spent = 1e3 * np.array([frame.time_spent_s for frame in run.frames])
+    fit = (
+        "turned about the vertical, shifted"
+        if metric
+        else "turned, shifted, scaled: one camera knows no metre"
+    )
+    rows = [
+        (
+            "way, by the truth",
+            f"{way:.2f} m in {(comparison.time_ns[-1] - comparison.time_ns[0]) * 1e-9:.1f} s",
+        ),
+        ("estimate laid over the truth", fit),
+        ("position error, rms", f"{np.sqrt(np.mean(error**2)):.4f} m"),
+    ]
+    if 0.02 < moving.mean() < 0.98:
+        share = f"{100 * moving.mean():.0f} % of the time"
+        rows.append((f"  while it moves ({share})", f"{np.sqrt(np.mean(error[moving] ** 2)):.4f} m"))
+    rows.append(("position error, largest", f"{error.max():.4f} m"))
+    if run.fixes:
+        if run.origin is None:
+            rows.append(("GPS", f"{len(run.fixes)} fixes, not used"))
+        else:
+            known_ns, position, _ = run.body.arrays()
+            since = known_ns >= run.anchored_ns
+            times = np.array([fix[0] for fix in run.fixes], dtype=np.int64)
+            here, inside = at_times(known_ns[since], position[since], times)
+            fixes = fixes_in_world(run)
+            rows.append(("GPS fixes against the estimate, rms", f"{rms(fixes[inside] - here[inside]):.2f} m"))
+    rows.append(
+        ("filter, median / 99 %", f"{np.median(spent):.2f} / {np.percentile(spent, 99):.2f} ms a frame")
+    )
+    words = ", ".join(f"{word} ({count} s)" for word, count in sorted(run.conditions.items()))
+    rows.append(("conditions while it ran", words or "none"))
+    return rows
+
+
+def draw(path: Path, title: str, run: Run, comparison: Comparison, rows) -> None:
+    figure = plt.figure(figsize=(15, 10), layout="constrained")
+    upper, lower = figure.subfigures(2, 1, height_ratios=(1, 1.5))
+    panels = upper.subplots(1, SHOWN_PICTURES)
+    places = np.linspace(0.15, 0.95, SHOWN_PICTURES)
+    for axes, place in zip(panels, places, strict=True):
+        draw_picture(axes, run, int(place * (len(run.frames) - 1)))
+    upper.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(STATES), fontsize=9
+    )
+    left, right = lower.subfigures(1, 2, width_ratios=(1, 1.15))
+    draw_from_above(left.subplots(), run, comparison)
+    axes = right.subplots(4, 1, height_ratios=(1, 1, 1, 1.15))
+    draw_over_time(axes[:3], run, comparison)
+    axes[3].axis("off")
+    axes[3].text(
+        0,
+        1,
+        "\n".join(f"{name:<36}{text}" for name, text in rows),
+        family="monospace",
+        fontsize=8.5,
+        va="top",
+    )
+    axes[0].sharex(axes[2])
+    axes[1].sharex(axes[2])
+    figure.suptitle(title)
+    partial = path.with_name(f".{path.name}")
+    figure.savefig(partial, format="png", dpi=90)
+    partial.replace(path)
+
+
+def report(arguments) -> None:
+    live, replay = read(arguments.live), read(arguments.replay)
+    print(check_replay(live, replay))
+    metric = live.method == "inertial-slam"
+    truth = live.truth if arguments.truth is None else read_tum(arguments.truth)
+    arm = np.zeros(3) if arguments.camera is None else camera_in_body(arguments.camera)
+    comparison = compare(live, truth, arm, metric)
+    rows = sums(live, comparison, metric)
+    draw(arguments.picture, arguments.title, live, comparison, rows)
+    for name, text in rows:
+        print(f"  {name:<42}{text}")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--live", type=Path, required=True)
+    parser.add_argument("--replay", type=Path, required=True)
+    parser.add_argument("--picture", type=Path, required=True)
+    parser.add_argument("--title", required=True)
+    parser.add_argument("--truth", type=Path, help="TUM file with poses of the body, where the log has none")
+    parser.add_argument(
+        "--camera", type=Path, help="sensor.yaml of the camera (EuRoC): where it is in the body"
+    )
+    arguments = parser.parse_args()
+    try:
+        report(arguments)
+    except (ReportError, OSError, ValueError) as error:
+        print(f"demo_slam_report.py: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
