@@ -4,6 +4,7 @@
 
 First pass: loc-live starts hub, logger, estimator and driver, everything goes over LCM into FOLDER/live.log.
 Second pass: lcm-logplayer sends the sensor messages of live.log to a new loc-estimator; FOLDER/replay.log.
+With --pictures it is loc-driver that sends them: it waits for an estimator whose queue holds few pictures.
 The output of every process is in FOLDER/*.txt. Ctrl-C stops all of them.
 """
 
@@ -111,15 +112,17 @@ def wait_for_end(label: str, last: str, log: Path, processes: Processes) -> None
     print(f"{clear}{label}: {last_size / 1e6:.0f} MB logged in {last_change - started:.0f} s", flush=True)
 
 
-def run_live(programs: Path, source: list[str], estimator: str, log: Path) -> None:
+def run_live(
+    programs: Path, source: list[str], estimator: str, log: Path, more: list[str], label: str = "live"
+) -> None:
     log.unlink(missing_ok=True)
     with Processes(log.parent) as processes:
         processes.start(
             "loc-live",
-            *(programs / "loc-live", *source, "--transport", "hub", "--speed", "max", "--log", log),
-            *("--estimator-args", estimator),
+            *(programs / "loc-live", *source, "--transport", "hub", "--log", log),
+            *("--estimator-args", estimator, *more),
         )
-        wait_for_end("live", "loc-live", log, processes)
+        wait_for_end(label, "loc-live", log, processes)
 
 
 def run_replay(programs: Path, recorded: Path, estimator: str, log: Path) -> None:
@@ -156,13 +159,26 @@ def main() -> int:
     )
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--estimator", default="", help="options of loc-estimator, in one string")
+    parser.add_argument("--config", type=Path, help="calibration (rig.yaml), for driver and estimator")
+    parser.add_argument("--speed", default="max", help="of loc-driver")
+    parser.add_argument("--driver", default="", help="more options of loc-driver, in one string")
+    parser.add_argument("--pictures", action="store_true", help="pictures are among the measurements")
     parser.add_argument("source", nargs=2, metavar=("KIND", "PATH"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
     live, replay = arguments.out / "live.log", arguments.out / "replay.log"
+    more = ["--speed", arguments.speed]
+    if arguments.config is not None:
+        more += ["--config", str(arguments.config)]
+    window = ["--driver-args", "--window 16"] if arguments.pictures and arguments.speed == "max" else []
+    driver = ["--driver-args", arguments.driver] if arguments.driver else window
     try:
-        run_live(arguments.programs, arguments.source, arguments.estimator, live)
-        run_replay(arguments.programs, live, arguments.estimator, replay)
+        run_live(arguments.programs, arguments.source, arguments.estimator, live, more + driver)
+        if arguments.pictures:
+            again = ["lcm-log", str(live)]
+            run_live(arguments.programs, again, arguments.estimator, replay, more + window, "replay")
+        else:
+            run_replay(arguments.programs, live, arguments.estimator, replay)
     except (PipelineError, OSError) as error:
         print(f"demo_pipeline.py: {error}", file=sys.stderr)
         return 1

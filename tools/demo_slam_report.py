@@ -1,10 +1,10 @@
-"""What tools/demo shows of SLAM from pictures: live and replayed run are the same, errors against the truth, and
-one picture that sums up the run.
+"""What tools/demo shows of SLAM from pictures: live and replayed run are the same, errors against the truth,
+and one picture that sums up the run.
 
     demo_slam_report.py --live live.log --replay replay.log --picture summary.png --title TEXT
 
-The logs hold the LCM types of msgs/ (Python package `loc`). The truth is LOC_REFERENCE in the log, or a TUM file
-(poses of the body). Exit code 1 when the runs differ, pictures were lost, or there is nothing to compare with.
+The logs hold the LCM types of msgs/ (Python package `loc`). The truth is LOC_REFERENCE in the log, or a TUM
+file (poses of the body). Exit code 1 when the runs differ or pictures were lost.
 """
 
 import argparse
@@ -111,7 +111,7 @@ def read(path: Path) -> Run:
         elif event.channel == "LOC_MAP":
             run.map_points = loc.map_points_t.decode(event.data)
         elif event.channel == "LOC_IMAGE":
-            # Fingerprint, time_ns, host_time_ns, sequence, exposure_ns: 8 bytes each, then the camera's number.
+            # Fingerprint, time_ns, host_time_ns, sequence, exposure_ns: 8 bytes each; the camera.
             if int.from_bytes(event.data[40:44], "big") == 0:
                 run.pictures.append((int.from_bytes(event.data[24:32], "big"), event.data))
         elif event.channel == "LOC_ESTIMATOR_STATUS":
@@ -123,8 +123,7 @@ def read(path: Path) -> Run:
         elif event.channel == "LOC_STATISTICS":
             message = loc.statistics_t.decode(event.data)
             if message.program == "loc-estimator":
-                values = dict(zip(message.name, message.value, strict=True))
-                run.latency_ms = {k: v for k, v in values.items() if k.startswith("latency")}
+                run.latency_ms = dict(zip(message.name, message.value, strict=True))
     if not run.frames:
         raise ReportError(f"{path}: no frame of SLAM in it")
     return run
@@ -137,7 +136,8 @@ def check_replay(live: Run, replay: Run) -> str:
     for name, run in (("live", live), ("the replay", replay)):
         if len(run.frames) != len(live.pictures):
             raise ReportError(
-                f"{name}: {len(run.frames)} of {len(live.pictures)} pictures reached the filter: the machine is busy"
+                f"{name}: {len(run.frames)} of {len(live.pictures)} pictures reached the filter:"
+                " is the machine busy?"
             )
     if len(live.same) != len(replay.same):
         raise ReportError(f"{len(live.same)} estimates live, {len(replay.same)} replayed: must be equal")
@@ -221,8 +221,8 @@ def rms(errors: np.ndarray) -> float:
 @dataclass
 class Comparison:
     time_ns: np.ndarray
-    estimate: np.ndarray  # aligned with the truth [m]
-    truth: np.ndarray
+    estimate: np.ndarray  # laid over the truth [m]; as it is where there is no truth
+    truth: np.ndarray | None
     alignment: Alignment  # of the estimates' world with that of the truth
     moving: np.ndarray
 
@@ -232,12 +232,13 @@ class Comparison:
 
 
 def compare(run: Run, truth: Track, arm: np.ndarray, metric: bool) -> Comparison:
-    """The body with an IMU; camera centres without one (an arm in metres does not fit lengths without a unit)."""
-    if len(truth.time_ns) < 2:
-        raise ReportError("no truth to compare with")
+    """The body with an IMU, otherwise camera centres: an arm in metres does not fit an unknown scale."""
     time_ns, position, _ = (run.body if metric else run.camera).arrays()
     if run.anchored_ns is not None:  # before, the world was another one
         time_ns, position = time_ns[time_ns >= run.anchored_ns], position[time_ns >= run.anchored_ns]
+    if len(truth.time_ns) < 2:
+        identity = Alignment(1.0, np.eye(3), np.zeros(3))
+        return Comparison(time_ns, position, None, identity, np.ones(len(time_ns), dtype=bool))
     truth_ns, truth_position, q_wxyz = truth.arrays()
     if not metric:
         truth_position = truth_position + rotate(q_wxyz, arm)
@@ -307,9 +308,10 @@ def known_points(run: Run) -> np.ndarray:
 
 
 def draw_from_above(axes, run: Run, comparison: Comparison) -> None:
-    axes.plot(*comparison.truth[:, :2].T, color="0.65", lw=4, label="truth")
+    if comparison.truth is not None:
+        axes.plot(*comparison.truth[:, :2].T, color="0.65", lw=4, label="truth")
     axes.plot(*comparison.estimate[:, :2].T, color="tab:blue", lw=1.3, label="estimate")
-    low, high = comparison.truth.min(axis=0), comparison.truth.max(axis=0)
+    low, high = comparison.estimate.min(axis=0), comparison.estimate.max(axis=0)
     if run.fixes and run.origin is not None:
         fixes = comparison.alignment(fixes_in_world(run))
         axes.plot(*fixes[:, :2].T, ".", color="tab:orange", ms=3, label="GPS", zorder=1)
@@ -327,8 +329,12 @@ def draw_from_above(axes, run: Run, comparison: Comparison) -> None:
 
 def draw_over_time(axes, run: Run, comparison: Comparison) -> None:
     t = run.seconds(comparison.time_ns)
-    axes[0].plot(t, 100 * comparison.error, color="tab:red", lw=1)
-    axes[0].set(ylabel="error [cm]", ylim=(0, None))
+    if comparison.truth is not None:
+        axes[0].plot(t, 100 * comparison.error, color="tab:red", lw=1)
+        axes[0].set(ylabel="error [cm]", ylim=(0, None))
+    else:
+        axes[0].plot(t, comparison.estimate[:, 2], color="tab:blue", lw=1)
+        axes[0].set(ylabel="z")
     frame_t = run.seconds([frame.time_ns for frame in run.frames])
     for name, label, colour in (
         ("map_size", "in the map", "k"),
@@ -348,20 +354,15 @@ def draw_over_time(axes, run: Run, comparison: Comparison) -> None:
         axis.margins(x=0.01)
 
 
-def sums(run: Run, comparison: Comparison, metric: bool) -> list[tuple[str, str]]:
+def errors(comparison: Comparison, metric: bool) -> list[tuple[str, str]]:
     moving, error = comparison.moving, comparison.error
     way = np.linalg.norm(np.diff(comparison.truth[:: max(1, len(error) // 500)], axis=0), axis=1).sum()
-    spent = 1e3 * np.array([frame.time_spent_s for frame in run.frames])
+    seconds = (comparison.time_ns[-1] - comparison.time_ns[0]) * 1e-9
     fit = (
-        "turned about the vertical, shifted"
-        if metric
-        else "turned, shifted, scaled: one camera knows no metre"
+        "turned about the vertical, shifted" if metric else "turned, shifted, scaled: no metre without an IMU"
     )
     rows = [
-        (
-            "way, by the truth",
-            f"{way:.2f} m in {(comparison.time_ns[-1] - comparison.time_ns[0]) * 1e-9:.1f} s",
-        ),
+        ("way, by the truth", f"{way:.2f} m in {seconds:.1f} s"),
         ("estimate laid over the truth", fit),
         ("position error, rms", f"{np.sqrt(np.mean(error**2)):.4f} m"),
     ]
@@ -369,6 +370,16 @@ def sums(run: Run, comparison: Comparison, metric: bool) -> list[tuple[str, str]
         share = f"{100 * moving.mean():.0f} % of the time"
         rows.append((f"  while it moves ({share})", f"{np.sqrt(np.mean(error[moving] ** 2)):.4f} m"))
     rows.append(("position error, largest", f"{error.max():.4f} m"))
+    return rows
+
+
+def sums(run: Run, comparison: Comparison, metric: bool) -> list[tuple[str, str]]:
+    spent = 1e3 * np.array([frame.time_spent_s for frame in run.frames])
+    rows = (
+        errors(comparison, metric)
+        if comparison.truth is not None
+        else [("truth", "none, nothing to compare with")]
+    )
     if run.fixes:
         if run.origin is None:
             rows.append(("GPS", f"{len(run.fixes)} fixes, not used"))
@@ -382,6 +393,9 @@ def sums(run: Run, comparison: Comparison, metric: bool) -> list[tuple[str, str]
     rows.append(
         ("filter, median / 99 %", f"{np.median(spent):.2f} / {np.percentile(spent, 99):.2f} ms a frame")
     )
+    if not metric and "latency.p50_ms" in run.latency_ms:  # sent at the camera's own pace
+        latency = [run.latency_ms[f"latency.{name}_ms"] for name in ("p50", "p99")]
+        rows.append(("picture to estimate, median / 99 %", f"{latency[0]:.1f} / {latency[1]:.1f} ms"))
     words = ", ".join(f"{word} ({count} s)" for word, count in sorted(run.conditions.items()))
     rows.append(("conditions while it ran", words or "none"))
     return rows
