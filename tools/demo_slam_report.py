@@ -31,6 +31,7 @@ STATES = (
 EARTH_RADIUS_M = 6_378_137.0
 MOVING_M_S = 0.03  # a truth that is slower stands still
 MAX_GAP_NS = 100_000_000
+KNOWN_SHARE = 0.3  # a point's deviation over its distance
 
 
 class ReportError(RuntimeError):
@@ -69,7 +70,7 @@ class Run:
     anchored_ns: int | None = None  # since when
     frames: list = field(default_factory=list)  # slam_frame_t
     pictures: list = field(default_factory=list)  # LOC_IMAGE of camera 0, not decoded: its number and bytes
-    map_points: object = None  # the last map_points_t
+    map_points: dict = field(default_factory=dict)  # id: place, the last that was known to KNOWN_SHARE
     conditions: dict = field(default_factory=dict)  # word: number of messages
     same: list = field(default_factory=list)  # bytes that must be those of another run
     published: int | None = None  # pictures, as the driver says
@@ -106,10 +107,12 @@ def read(path: Path) -> Run:
             message = loc.fusion_t.decode(event.data)
             place = (message.origin_latitude, message.origin_longitude, message.origin_altitude)
             if np.isfinite(place).all():
-                run.anchored_ns = message.time_ns if run.origin is None else run.anchored_ns
+                if run.origin is None:
+                    run.anchored_ns = message.time_ns
+                    run.map_points.clear()  # of another world
                 run.origin = place
         elif event.channel == "LOC_MAP":
-            run.map_points = loc.map_points_t.decode(event.data)
+            add_known_points(run, loc.map_points_t.decode(event.data))
         elif event.channel == "LOC_IMAGE":
             # Fingerprint, time_ns, host_time_ns, sequence, exposure_ns: 8 bytes each; the camera.
             if int.from_bytes(event.data[40:44], "big") == 0:
@@ -127,6 +130,17 @@ def read(path: Path) -> Run:
     if not run.frames:
         raise ReportError(f"{path}: no frame of SLAM in it")
     return run
+
+
+def add_known_points(run: Run, message) -> None:
+    if message.size == 0 or not run.camera.position:
+        return
+    points = np.array(message.position)
+    covariance = np.array(message.position_cov).reshape(-1, 3, 3)
+    sigma = np.sqrt(np.trace(covariance, axis1=1, axis2=2))
+    known = sigma < KNOWN_SHARE * np.linalg.norm(points - run.camera.position[-1], axis=1)
+    for index in np.flatnonzero(known):
+        run.map_points[message.point_id[index]] = points[index]
 
 
 def check_replay(live: Run, replay: Run) -> str:
@@ -297,16 +311,6 @@ def draw_picture(axes, run: Run, index: int) -> None:
     )
 
 
-def known_points(run: Run) -> np.ndarray:
-    """Of the last map, those whose deviation is below 30 % of their distance."""
-    if run.map_points is None or run.map_points.size == 0:
-        return np.zeros((0, 3))
-    points = np.array(run.map_points.position)
-    covariance = np.array(run.map_points.position_cov).reshape(-1, 3, 3)
-    sigma = np.sqrt(np.trace(covariance, axis1=1, axis2=2))
-    return points[sigma < 0.3 * np.linalg.norm(points - run.camera.position[-1], axis=1)]
-
-
 def draw_from_above(axes, run: Run, comparison: Comparison) -> None:
     if comparison.truth is not None:
         axes.plot(*comparison.truth[:, :2].T, color="0.65", lw=4, label="truth")
@@ -315,11 +319,11 @@ def draw_from_above(axes, run: Run, comparison: Comparison) -> None:
     if run.fixes and run.origin is not None:
         fixes = comparison.alignment(fixes_in_world(run))
         axes.plot(*fixes[:, :2].T, ".", color="tab:orange", ms=3, label="GPS", zorder=1)
-    points = comparison.alignment(known_points(run))
+    points = comparison.alignment(np.array(list(run.map_points.values())).reshape(-1, 3))
     reach = 0.5 * max(high - low)  # what is farther away would set the scale
     near = np.all((points > low - reach) & (points < high + reach), axis=1)
     if near.any():
-        axes.plot(*points[near, :2].T, ".", color="tab:purple", ms=3, label="map, points known to 30 %")
+        axes.plot(*points[near, :2].T, ".", color="tab:purple", ms=3, label="map")
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="x [m]", ylabel="y [m]")
     axes.legend(fontsize=8, loc="best")
