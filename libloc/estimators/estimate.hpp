@@ -53,6 +53,7 @@ enum EstimateStatus : std::uint32_t {
   kRefound = 1U << 24U,  ///< It found itself again, since the last estimate.
   kCalibrationDoubtful = 1U << 25U,  ///< Pictures disagree with the map in a way that wrong intrinsics explain.
   kTiltDoubtful = 1U << 26U,         ///< The accelerometers by themselves say another vertical.
+  kStampsDoubtful = 1U << 27U,       ///< Camera and gyroscope turn alike, but not at the same time.
 };
 
 /// Error-state order of the covariance: theta, position, velocity, gyroscope bias, accelerometer bias.

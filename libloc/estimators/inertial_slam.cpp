@@ -63,7 +63,8 @@ InertialSlam::InertialSlam(const SlamOptions& options)
       start_(options.start, options.stand_still, options.imu_noise, options.gravity),
       moving_start_(moving_start_options(options), options.camera, options.imu_noise, options.gravity),
       rest_(options.stand_still, options.imu_noise, options.gravity),
-      picture_rest_(options.camera.intrinsics_px.tail<2>(), options.still_picture_px, options.still_picture_s) {
+      picture_rest_(options.camera.intrinsics_px.tail<2>(), options.still_picture_px, options.still_picture_s),
+      stamps_(options.camera) {
   require(options.motion == SlamMotion::kInertial, "motion: InertialSlam needs an IMU, MonoSlam does without");
 }
 
@@ -155,6 +156,7 @@ bool InertialSlam::receive(const ImuMeasurement& imu) {
 
 bool InertialSlam::hold_back(const ImuMeasurement& imu) {
   newest_ns_ = imu.time_ns;
+  stamps_.see(imu);
   const TimeNs hold = hold_back_ns();
   if (hold == 0 && held_.empty()) return process_imu(imu);
   held_.push_back(imu);
@@ -185,6 +187,7 @@ void InertialSlam::process_frame(const FeaturesMeasurement& frame) {
     skip("features.skipped.without_imu", 0);
   }
   last_frame_ns_ = frame.time_ns;
+  stamps_.see(frame);
   waiting_.push_slot() = frame;
   if (filter_.started()) return;
   ++early_frames_;
@@ -589,6 +592,7 @@ Estimate InertialSlam::estimate() const {
     out = filter_.estimate();
     out.status |= status_ | frame_status_;
   }
+  if (stamps_.doubtful()) out.status |= kStampsDoubtful;
   out.time_ns = last_.time_ns;
   out.host_time_ns = last_.host_time_ns;
   out.sequence = last_.sequence;
@@ -600,6 +604,7 @@ NamedCounts InertialSlam::counts() const {
                      {"features.used", frames_used_},
                      {"features.waiting", static_cast<std::int64_t>(waiting_.size())}};
   for (const auto& [name, value] : counts_) out.push_back({name, value});
+  if (stamps_.doubtful()) out.push_back({"stamps.camera_to_add_ms", std::llround(1e3 * stamps_.offset_s())});
   for (NamedCount& count : filter_.counts()) out.push_back(std::move(count));
   return out;
 }

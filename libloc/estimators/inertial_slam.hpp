@@ -25,6 +25,7 @@
 #include "libloc/estimators/slam_filter.hpp"
 #include "libloc/estimators/slam_options.hpp"
 #include "libloc/estimators/slam_start.hpp"
+#include "libloc/estimators/stamp_watch.hpp"
 #include "libloc/estimators/stand_still.hpp"
 
 namespace loc {
@@ -56,6 +57,8 @@ class InertialSlam {
   std::span<const SlamFrame> frames() const { return {frames_.data(), frame_count_}; }
   std::vector<SlamMapPoint> map() const { return filter_.map(); }
   const SlamFilter& filter() const { return filter_; }
+  /// Whether the stamps of camera and gyroscope fit (kStampsDoubtful); works before a start, too.
+  const StampWatch& stamp_watch() const { return stamps_; }
   const SlamOptions& options() const { return filter_.options(); }
 
   SlamSnapshot snapshot() const { return filter_.snapshot(); }
@@ -110,6 +113,7 @@ class InertialSlam {
   SlamStart moving_start_;
   StandStillDetector rest_;
   PictureRest picture_rest_;
+  StampWatch stamps_;
   std::vector<SlamFrame> frames_;
   std::size_t frame_count_ = 0;
 

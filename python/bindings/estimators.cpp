@@ -336,6 +336,7 @@ void bind_estimate(py::module_& m) {
       .value("REFOUND", loc::kRefound)
       .value("CALIBRATION_DOUBTFUL", loc::kCalibrationDoubtful)
       .value("TILT_DOUBTFUL", loc::kTiltDoubtful)
+      .value("STAMPS_DOUBTFUL", loc::kStampsDoubtful)
       .finalize();
   using loc::Estimate;
   py::class_<Estimate>(m, "Estimate", "What an estimator says after one measurement.")

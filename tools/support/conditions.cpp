@@ -25,6 +25,7 @@ const std::array<Condition, Conditions::kConditions>& Conditions::known() {
                                                                {kGpsRejected, "GPS rejected"},
                                                                {kOdometryRejected, "odometry rejected"},
                                                                {kCalibrationDoubtful, "calibration doubtful"},
+                                                               {kStampsDoubtful, "stamps of camera and IMU doubtful"},
                                                                {kTiltDoubtful, "tilt doubtful"},
                                                                {kMagnetometerDisturbed, "magnetometer disturbed"}}};
   return kAll;

@@ -44,7 +44,7 @@ class Conditions {
     TimeNs seen_ns = kNoTime;   // last said
     std::int64_t times = 0;
   };
-  static constexpr std::size_t kConditions = 11;
+  static constexpr std::size_t kConditions = 12;
   static const std::array<Condition, kConditions>& known();
 
   std::array<Track, kConditions> tracks_{};

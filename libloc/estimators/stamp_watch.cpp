@@ -1,0 +1,190 @@
+#include "libloc/estimators/stamp_watch.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace loc {
+namespace {
+
+constexpr TimeNs kGrid = 10'000'000;
+constexpr TimeNs kStep = 20'000'000;         // between the offsets that are tried
+constexpr TimeNs kFarthest = 2'000'000'000;  // offset
+constexpr TimeNs kWindow = 10'000'000'000;
+constexpr TimeNs kEvery = 2'000'000'000;  // judgement
+constexpr TimeNs kGap = 500'000'000;
+constexpr std::size_t kFewestTurns = 60;
+constexpr std::size_t kFewestFeatures = 6;
+constexpr double kLeastRate = 0.05;  // root mean square, about the mean [rad/s]
+constexpr double kOwnScale = 2e-3;   // directions that fit worse count less [rad]
+constexpr double kLeastCorrelation = 0.6;
+constexpr double kClearlyBetter = 0.15;  // than at zero
+constexpr double kUnique = 0.05;         // than at offsets that are further away than kNear
+constexpr TimeNs kNear = 400'000'000;
+constexpr double kLeastOffset = 0.05;  // that is called a doubt [s]
+constexpr double kSame = 0.1;          // two judgements in a row [s]
+
+}  // namespace
+
+StampWatch::StampWatch(const CameraCalibration& camera)
+    : camera_(camera),
+      body_camera_(camera.T_body_camera.rotation.toRotationMatrix()),
+      offset_ns_(from_seconds(camera.time_offset_s)) {}
+
+void StampWatch::reset() {
+  while (!angles_.empty()) angles_.drop_front();
+  while (!turns_.empty()) turns_.drop_front();
+  grid_ns_ = imu_ns_ = frame_ns_ = judged_ns_ = kNoTime;
+  angle_.setZero();
+  last_.clear();
+  before_s_ = offset_s_ = correlation_ = kUnknown;
+  doubtful_ = false;
+}
+
+void StampWatch::see(const ImuMeasurement& imu) {
+  if (!imu.angular_velocity.allFinite()) return;
+  if (imu_ns_ == kNoTime || imu.time_ns <= imu_ns_ || imu.time_ns - imu_ns_ > kGap) {
+    while (!angles_.empty()) angles_.drop_front();
+    grid_ns_ = imu_ns_ = imu.time_ns;
+    angle_.setZero();
+    angles_.push_back(angle_);
+    return;
+  }
+  // The rate of this sample is that of the time since the last one.
+  const Eigen::Vector3d before = angle_;
+  angle_ += to_seconds(imu.time_ns - imu_ns_) * imu.angular_velocity;
+  for (TimeNs next = grid_ns_ + static_cast<TimeNs>(angles_.size()) * kGrid; next <= imu.time_ns; next += kGrid) {
+    const double part = static_cast<double>(next - imu_ns_) / static_cast<double>(imu.time_ns - imu_ns_);
+    angles_.push_back(before + part * (angle_ - before));
+  }
+  imu_ns_ = imu.time_ns;
+  constexpr auto kMost = static_cast<std::size_t>((kWindow + 4 * kFarthest) / kGrid);
+  while (angles_.size() > kMost) {
+    angles_.drop_front();
+    grid_ns_ += kGrid;
+  }
+}
+
+// phi that fits r1 - r0 = r0 x phi, the outliers put aside by weights.
+bool StampWatch::turn_between(const FeaturesMeasurement& frame, Eigen::Vector3d& turn) const {
+  pairs_.clear();
+  for (const FeatureObservation& feature : frame.features) {
+    const auto before = std::lower_bound(last_.begin(), last_.end(), feature.id,
+                                         [](const auto& entry, std::int64_t id) { return entry.first < id; });
+    if (before == last_.end() || before->first != feature.id || !feature.pixel_px.allFinite()) continue;
+    if (const auto ray = camera_.unproject(feature.pixel_px)) pairs_.emplace_back(before->second, *ray);
+  }
+  if (pairs_.size() < kFewestFeatures) return false;
+  turn.setZero();
+  for (int pass = 0; pass < 3; ++pass) {
+    Eigen::Matrix3d normal = 1e-9 * Eigen::Matrix3d::Identity();
+    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+    for (const auto& [r0, r1] : pairs_) {
+      const double left = pass == 0 ? 0 : (r1 - r0 - r0.cross(turn)).norm() / kOwnScale;
+      const double weight = 1 / (1 + left * left);
+      normal += weight * (Eigen::Matrix3d::Identity() - r0 * r0.transpose());
+      right -= weight * r0.cross(r1);
+    }
+    turn = normal.ldlt().solve(right);
+  }
+  return turn.allFinite();
+}
+
+void StampWatch::see(const FeaturesMeasurement& frame) {
+  const bool follows = frame_ns_ != kNoTime && frame.time_ns > frame_ns_ && frame.time_ns - frame_ns_ <= kGap;
+  Eigen::Vector3d turn;
+  if (follows && turn_between(frame, turn)) {
+    const double dt = to_seconds(frame.time_ns - frame_ns_);
+    turns_.push_back({frame_ns_ + offset_ns_, frame.time_ns + offset_ns_, body_camera_ * turn / dt});
+  } else if (!follows) {
+    while (!turns_.empty()) turns_.drop_front();
+    judged_ns_ = kNoTime;
+  }
+  frame_ns_ = frame.time_ns;
+  while (!turns_.empty() && turns_.back().end_ns - turns_.front().begin_ns > kWindow + 2 * kFarthest) {
+    turns_.drop_front();
+  }
+  last_.clear();
+  for (const FeatureObservation& feature : frame.features) {
+    if (!feature.pixel_px.allFinite()) continue;
+    if (const auto ray = camera_.unproject(feature.pixel_px)) last_.emplace_back(feature.id, *ray);
+  }
+  std::sort(last_.begin(), last_.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  if (judged_ns_ == kNoTime) judged_ns_ = frame.time_ns;
+  if (frame.time_ns - judged_ns_ < kEvery) return;
+  judged_ns_ = frame.time_ns;
+  judge();
+}
+
+bool StampWatch::angle_at(TimeNs time_ns, Eigen::Vector3d& angle) const {
+  if (time_ns < grid_ns_) return false;
+  const auto i = static_cast<std::size_t>((time_ns - grid_ns_) / kGrid);
+  if (i + 1 >= angles_.size()) return false;
+  const double part = static_cast<double>((time_ns - grid_ns_) % kGrid) / static_cast<double>(kGrid);
+  angle = angles_[i] + part * (angles_[i + 1] - angles_[i]);
+  return true;
+}
+
+// Of turns_[from, to) with the gyroscope's, moved. false: there is none, or too little turning.
+bool StampWatch::correlate(TimeNs shift_ns, std::size_t from, std::size_t to, double& correlation) {
+  Eigen::Vector3d sum_c = Eigen::Vector3d::Zero();
+  Eigen::Vector3d sum_g = Eigen::Vector3d::Zero();
+  double cc = 0;
+  double gg = 0;
+  double cg = 0;
+  for (std::size_t i = from; i < to; ++i) {
+    const Turn& turn = turns_[i];
+    Eigen::Vector3d begin;
+    Eigen::Vector3d end;
+    if (!angle_at(turn.begin_ns + shift_ns, begin) || !angle_at(turn.end_ns + shift_ns, end)) return false;
+    const Eigen::Vector3d g = (end - begin) / to_seconds(turn.end_ns - turn.begin_ns);
+    sum_c += turn.rate;
+    sum_g += g;
+    cc += turn.rate.squaredNorm();
+    gg += g.squaredNorm();
+    cg += turn.rate.dot(g);
+  }
+  const auto n = static_cast<double>(to - from);
+  cc -= sum_c.squaredNorm() / n;
+  gg -= sum_g.squaredNorm() / n;
+  cg -= sum_c.dot(sum_g) / n;
+  const double least = n * kLeastRate * kLeastRate;
+  if (!(cc > least && gg > least)) return false;
+  correlation = cg / std::sqrt(cc * gg);
+  return true;
+}
+
+void StampWatch::judge() {
+  // The turns for which the gyroscope is known at every offset.
+  std::size_t from = 0;
+  std::size_t to = turns_.size();
+  const TimeNs known_from = grid_ns_ + kFarthest;
+  const TimeNs known_to = grid_ns_ + (static_cast<TimeNs>(angles_.size()) - 2) * kGrid - kFarthest;
+  while (from < to && turns_[from].begin_ns < known_from) ++from;
+  while (to > from && turns_[to - 1].end_ns > known_to) --to;
+  while (to > from && turns_[to - 1].end_ns - turns_[from].begin_ns > kWindow) ++from;
+  if (to - from < kFewestTurns) return;
+
+  std::vector<std::pair<TimeNs, double>> found;
+  for (TimeNs shift = -kFarthest; shift <= kFarthest; shift += kStep) {
+    double correlation = 0;
+    if (correlate(shift, from, to, correlation)) found.emplace_back(shift, correlation);
+  }
+  const auto at_zero = std::find_if(found.begin(), found.end(), [](const auto& one) { return one.first == 0; });
+  if (at_zero == found.end()) return;
+  const auto best =
+      *std::max_element(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  const bool at_border = std::abs(best.first) == kFarthest;
+  const bool unique = std::none_of(found.begin(), found.end(), [&](const auto& one) {
+    return std::abs(one.first - best.first) > kNear && one.second > best.second - kUnique;
+  });
+  if (best.second < kLeastCorrelation || at_border || !unique) return;  // says nothing; what was said stays
+  const double offset = to_seconds(best.first);
+  const bool wrong = std::abs(offset) >= kLeastOffset && best.second - at_zero->second >= kClearlyBetter;
+  doubtful_ = wrong && std::abs(offset - before_s_) <= kSame;
+  before_s_ = wrong ? offset : kUnknown;
+  offset_s_ = offset;
+  correlation_ = best.second;
+}
+
+}  // namespace loc
