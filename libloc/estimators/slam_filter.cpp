@@ -54,6 +54,7 @@ SlamFilter::SlamFilter(const SlamOptions& options)
   measurements_.resize(features);
   which_.reserve(features);
   candidates_.reserve(features);
+  young_.reserve(features);
   residual_.reserve(2 * features);
   accepted_.reserve(2 * features);
   accepted_residual_.reserve(2 * features);
@@ -189,6 +190,7 @@ const SlamFrame& SlamFilter::update(const FeaturesMeasurement& frame, std::uint3
   select_measured(frame);
   update_agreeing(frame);
   rescue(frame);
+  estimate_young(frame);
   locate(frame);
   judge(frame);
   const Pose3 T_world_camera = state_.T_world_camera();

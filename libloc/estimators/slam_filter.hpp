@@ -9,6 +9,7 @@
 //   3. of those matched the most informative ones (largest det S) are taken, up to max_measured
 //   4. 1-point RANSAC finds which of them agree; those update the state together
 //   5. the others are predicted anew: who is within the gate now was right (rescued) and updates it, too
+//      Features that are new only learn from what is measured of them (steer_after_frames)
 //   6. a frame is found in the map when enough features of it that were there before agree. After lost_after_s of
 //      frames that are not it is lost (kLost): a few that agree by chance then change nothing, and for relocate_s of
 //      frames with something in them nothing is added, while the front end looks for the map. What finds it then says
@@ -162,13 +163,22 @@ class SlamFilter {
   void iterate(const FeaturesMeasurement& frame);
   Eigen::Vector2d moved_by(const BlockMeasurement& measurement) const;
   void rescue(const FeaturesMeasurement& frame);
+  void estimate_young(const FeaturesMeasurement& frame);
   void apply_update();
+  void judge(const FeaturesMeasurement& frame);
+  void report(const FeaturesMeasurement& frame);
+
+  // slam_filter_locate.cpp
   void locate(const FeaturesMeasurement& frame);
   bool looks_for_map() const;
   int fewest_to_find() const;
   void forget_location();
-  void judge(const FeaturesMeasurement& frame);
-  void report(const FeaturesMeasurement& frame);
+  bool is_young(const SlamLandmark& landmark) const;
+  bool is_hidden(const SlamLandmark& landmark, double lately_s) const;
+  bool is_covered(const Eigen::Vector2d& pixel_px) const;
+  bool waits_below_cover(const SlamLandmark& landmark) const;
+  void see_cover();
+  bool below_cover() const;
 
   // slam_filter_map.cpp
   void delete_landmarks();
@@ -204,6 +214,7 @@ class SlamFilter {
   std::vector<BlockMeasurement> measurements_;
   std::vector<int> which_;
   std::vector<int> candidates_;
+  std::vector<int> young_;  // of the frame, that do not steer
   std::vector<double> residual_;
   std::vector<int> accepted_;
   std::vector<double> accepted_residual_;
@@ -234,6 +245,7 @@ class SlamFilter {
   TimeNs found_ns_ = kNoTime;       // its time
   TimeNs last_frame_ns_ = kNoTime;  // of any frame
   double strange_s_ = 0;            // for so long frames have shown something else
+  TimeNs cover_ns_ = kNoTime;       // when something last hid many features at once
   double usually_found_ = 0;        // features
 
   std::int64_t frames_ = 0;

@@ -55,6 +55,7 @@ void SlamFilter::delete_landmarks() {
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     const SlamLandmark& landmark = landmarks_[i];
     if (landmark.known) continue;
+    if (waits_below_cover(landmark)) continue;
     bool leave = landmark.tries >= options_.map.delete_after_tries &&
                  landmark.hits < options_.map.delete_below_ratio * landmark.tries;
     if (!landmark.point.converted) {
@@ -211,6 +212,7 @@ void SlamFilter::add_landmarks(const FeaturesMeasurement& frame) {
                      .squaredNorm() < nearest;
     });
     if (crowded) continue;
+    if (is_covered(feature.pixel_px)) continue;
     const auto expected = std::lower_bound(expected_.begin(), expected_.end(), feature.id,
                                            [](const ExpectedDepth& one, std::int64_t id) { return one.id < id; });
     const bool hint = expected != expected_.end() && expected->id == feature.id;

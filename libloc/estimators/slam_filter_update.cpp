@@ -17,10 +17,7 @@ constexpr double kLeastSigmaPx = 1e-3;   // what no tracker does better
 constexpr double kFarthest = 27.9;       // chi-square of 6, 0.9999
 constexpr double kAbsurdPx = 1e4;        // a residual without meaning: the point is in the plane of the camera
 constexpr double kNarrowSigmas = 3;      // of a pixel's own deviation
-constexpr int kFewestFound = 3;          // features that hold a pose
-constexpr int kFewestRefound = 8;        // and that do not agree by chance
-constexpr double kFoundPart = 0.2;       // of those that are usually found
-constexpr double kUsualPart = 0.1;       // of a frame in what is usual
+constexpr int kEnoughToSteer = 8;        // older features, so that younger ones need not
 
 double square(double x) {
   return x * x;
@@ -241,14 +238,25 @@ void SlamFilter::select_measured(const FeaturesMeasurement& frame) {
   }
   if (approached_) first_ = state_;  // the first estimate that means anything
   state_ = prior;
-  const auto most = static_cast<std::size_t>(options_.map.max_measured);
-  if (candidates_.size() > most) {
-    const auto tells = [&](int i) { return landmarks_[static_cast<std::size_t>(i)].innovation_cov.determinant(); };
-    std::nth_element(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(most), candidates_.end(),
-                     [&](int a, int b) { return tells(a) > tells(b); });
-    candidates_.resize(most);
-    std::sort(candidates_.begin(), candidates_.end());
+  // The map is in the order of its age.
+  const auto first_young = std::partition_point(candidates_.begin(), candidates_.end(), [&](int i) {
+    return !is_young(landmarks_[static_cast<std::size_t>(i)]);
+  });
+  young_.clear();
+  if (below_cover() && first_young - candidates_.begin() >= kEnoughToSteer) {
+    young_.assign(first_young, candidates_.end());
+    candidates_.erase(first_young, candidates_.end());
   }
+  const auto keep = [&](std::vector<int>& which, std::size_t most) {
+    if (which.size() <= most) return;
+    const auto tells = [&](int i) { return landmarks_[static_cast<std::size_t>(i)].innovation_cov.determinant(); };
+    std::nth_element(which.begin(), which.begin() + static_cast<std::ptrdiff_t>(most), which.end(),
+                     [&](int a, int b) { return tells(a) > tells(b); });
+    which.resize(most);
+    std::sort(which.begin(), which.end());
+  };
+  keep(candidates_, static_cast<std::size_t>(options_.map.max_measured));
+  keep(young_, static_cast<std::size_t>(options_.map.max_measured));
   which_ = candidates_;
 }
 
@@ -458,61 +466,32 @@ void SlamFilter::rescue(const FeaturesMeasurement& frame) {
   apply_update();
 }
 
-// While the map is looked for nothing joins it.
-bool SlamFilter::looks_for_map() const {
-  return found_frame_ >= 0 && strange_s_ < options_.relocate_s;
-}
-
-// As many as hardly agree by chance; fewer where there never are many.
-int SlamFilter::fewest_to_find() const {
-  return std::clamp(static_cast<int>(kFoundPart * usually_found_), kFewestFound, kFewestRefound);
-}
-
-void SlamFilter::forget_location() {
-  found_ = true;
-  lost_ = refound_ = false;
-  found_frame_ = -1;
-  found_ns_ = last_frame_ns_ = kNoTime;
-  strange_s_ = usually_found_ = 0;
-}
-
-// Is the frame one of this map?
-void SlamFilter::locate(const FeaturesMeasurement& frame) {
-  int old = 0;  // that were there when the last frame was found
-  int young = 0;
-  int old_rejected = 0;
-  for (const SlamLandmark& landmark : landmarks_) {
-    const bool measured = landmark.state == SlamFeatureState::kMeasured || landmark.state == SlamFeatureState::kRescued;
-    const bool is_old = landmark.first_frame <= found_frame_;
-    if (is_old && landmark.observation >= 0 && landmark.state == SlamFeatureState::kRejected) ++old_rejected;
-    if (measured) ++(is_old ? old : young);
+// What is new may move by itself, and moves as a near feature would for a while. It is tracked by the pose that the
+// others gave, and learns its depth with all that this pose is not known by, but changes nothing else.
+void SlamFilter::estimate_young(const FeaturesMeasurement& frame) {
+  which_.clear();
+  for (const int i : young_) {
+    const auto at = static_cast<std::size_t>(i);
+    const Eigen::Vector2d& pixel = frame.features[static_cast<std::size_t>(landmarks_[at].observation)].pixel_px;
+    landmarks_[at].state = SlamFeatureState::kRejected;
+    if (linearise(landmarks_[at], pixel, sigma_px(frame), measurements_[at])) which_.push_back(i);
   }
-  refound_ = false;
-  const double since = last_frame_ns_ == kNoTime ? 0 : std::max(0.0, to_seconds(time_ns_ - last_frame_ns_));
-  last_frame_ns_ = time_ns_;
-  if (found_ns_ == kNoTime || found_ns_ > time_ns_) found_ns_ = time_ns_;  // the beginning; a clock that was set back
-  const bool began = found_frame_ >= 0;
-  const bool by_old = old >= fewest_to_find() && !(lost_ && old_rejected > old);
-  // What came while nothing was found: surroundings that are new.
-  const bool by_all = old + young >= kFewestFound && !looks_for_map();
-  found_ = by_old || by_all || !began;
-  if (by_old || by_all) {
-    refound_ = lost_ && by_old;
-    if (refound_) ++times_refound_;
-    if (lost_ && !by_old) ++times_gone_on_;
-    lost_ = false;
-    found_frame_ = frames_;
-    found_ns_ = time_ns_;
-    strange_s_ = 0;
-    usually_found_ += kUsualPart * (old + young - usually_found_);
+  if (which_.empty()) return;
+  innovate();
+  accept(ransac_.compatible(covariance_, residual_));
+  if (accepted_.empty()) return;
+  const auto first = static_cast<std::size_t>(which_.front());
+  if (!covariance_.update(accepted_, accepted_residual_, dx_, nis_, landmarks_[first].offset)) {
+    ++failed_updates_;
     return;
   }
-  if (!began) return;
-  if (static_cast<int>(frame.features.size()) >= kFewestRefound) {
-    strange_s_ += std::min(since, options_.lost_after_s);  // what a pause hid was not seen
+  for (std::size_t k = 0; k < accepted_.size(); k += 2) {
+    const auto i = static_cast<std::size_t>(which_[static_cast<std::size_t>(accepted_[k]) / 2]);
+    landmarks_[i].state = SlamFeatureState::kMeasured;
   }
-  lost_ = lost_ || to_seconds(time_ns_ - found_ns_) > options_.lost_after_s;
-  if (lost_) ++lost_frames_;
+  frame_.nis += nis_;
+  frame_.nis_dim += static_cast<int>(accepted_.size());
+  apply_update();
 }
 
 // Who was measured, and who should have been.
@@ -545,6 +524,7 @@ void SlamFilter::judge(const FeaturesMeasurement& frame) {
     if (const auto now = predict(state_, camera_, landmark.point)) after += (pixel - *now).squaredNorm();
     ++used;
   }
+  see_cover();
   frame_.reprojection_before_px = root_mean_square(before, used);
   frame_.reprojection_after_px = root_mean_square(after, used);
 }

@@ -39,6 +39,8 @@ void SlamMapOptions::check() const {
   require_at_least("map.min_visible", min_visible, 1);
   require(min_visible <= max_features, "map.min_visible", min_visible, "must not be above map.max_features");
   require_at_least("map.max_added", max_added, 1);
+  require_at_least("map.steer_after_frames", steer_after_frames, 0);
+  require(cover_radius_px >= 0, "map.cover_radius_px", cover_radius_px, "must not be negative");
   require_at_least("map.grid_columns", grid_columns, 1);
   require_at_least("map.grid_rows", grid_rows, 1);
   require(grid_columns <= 1000 && grid_rows <= 1000, "map.grid_columns and map.grid_rows must be at most 1000");

@@ -63,8 +63,14 @@ struct SlamMapOptions {
   bool depth_from_neighbours = true;  ///< rho_0 of a new feature is the median of those that are known; its deviation
                                       ///< grows with it
   double max_linearity_index = 0.07;  ///< below it a feature becomes XYZ (inverse_depth.hpp); 0: never
-  int delete_after_tries = 10;        ///< frames in which it was expected, before it is judged
-  double delete_below_ratio = 0.5;    ///< measured in less than this share of them: deleted
+  /// While something hides many features at once, younger ones than that are estimated but move nothing else, if there
+  /// are enough older ones: what moves by itself is found out before it spoils the pose. 0: off
+  int steer_after_frames = 0;
+  /// Nothing joins the map so near to features that are expected but hidden, where most are, and they stay in the map
+  /// for a while: what came before them may move on. 0: off [px]
+  double cover_radius_px = 0;
+  int delete_after_tries = 10;      ///< frames in which it was expected, before it is judged
+  double delete_below_ratio = 0.5;  ///< measured in less than this share of them: deleted
 
   /// @throws std::invalid_argument naming the field and its value.
   void check() const;

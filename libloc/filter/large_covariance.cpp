@@ -337,7 +337,7 @@ bool LargeCovariance<Scalar>::correction(std::span<const int> accepted, std::spa
 
 template <class Scalar>
 bool LargeCovariance<Scalar>::update(std::span<const int> accepted, std::span<const double> residual,
-                                     Eigen::VectorXd& dx, double& nis) {
+                                     Eigen::VectorXd& dx, double& nis, int from) {
   const int m = static_cast<int>(accepted.size());
   dx.setZero(dim_);
   nis = 0;
@@ -358,12 +358,16 @@ bool LargeCovariance<Scalar>::update(std::span<const int> accepted, std::span<co
   Scalar* const change = work_.data() + size(leading_, kMaxHeadDim);
   blas::gemm(Transpose::kNo, Transpose::kNo, dim_, 1, m, Scalar(1), gain_.data(), leading_, y, m, Scalar(0), change,
              leading_);
-  for (int i = 0; i < dim_; ++i) dx[i] = static_cast<double>(change[i]);
+  for (int i = from; i < dim_; ++i) dx[i] = static_cast<double>(change[i]);
   if (!std::isfinite(nis) || !dx.allFinite()) return false;
-  blas::syrk_lower(dim_, m, Scalar(-1), gain_.data(), leading_, p_.data(), leading_);
+  if (from > 0) {
+    blas::gemm(Transpose::kNo, Transpose::kYes, dim_ - from, from, m, Scalar(-1), gain_.data() + from, leading_,
+               gain_.data(), leading_, Scalar(1), p_.data() + index(from, 0), leading_);
+  }
+  blas::syrk_lower(dim_ - from, m, Scalar(-1), gain_.data() + from, leading_, p_.data() + index(from, from), leading_);
   if constexpr (sizeof(Scalar) == sizeof(float)) {
     // What rounding takes from the smallest of many variances is more than its share: a millionth each time makes up.
-    for (int i = 0; i < dim_; ++i) p_[index(i, i)] *= Scalar(1 + 1e-6);
+    for (int i = from; i < dim_; ++i) p_[index(i, i)] *= Scalar(1 + 1e-6);
   }
   mirror_head();
   return true;

@@ -102,8 +102,11 @@ class LargeCovariance {
 
   /// Takes rows of the last innovate() for true. @param accepted the rows that are used, ascending @param residual of
   /// these rows @param dx dim() long @param nis r^T S^-1 r of these rows
+  /// @param from errors before it keep their values and covariance (their gain is zero, which is suboptimal for them
+  /// and right for the others: Schmidt's consider filter)
   /// @returns false, and leaves P as it is, when their S is not positive definite.
-  bool update(std::span<const int> accepted, std::span<const double> residual, Eigen::VectorXd& dx, double& nis);
+  bool update(std::span<const int> accepted, std::span<const double> residual, Eigen::VectorXd& dx, double& nis,
+              int from = 0);
 
   /// P = T P T^T with T = I + U E^T: the errors get U times the three errors at first.
   /// @param u dim() x 3

@@ -74,8 +74,9 @@ class MapCovariance {
   bool correction(std::span<const int> accepted, std::span<const double> residual, Eigen::VectorXd& dx) {
     return visit([&](auto& p) { return p.correction(accepted, residual, dx); });
   }
-  bool update(std::span<const int> accepted, std::span<const double> residual, Eigen::VectorXd& dx, double& nis) {
-    return visit([&](auto& p) { return p.update(accepted, residual, dx, nis); });
+  bool update(std::span<const int> accepted, std::span<const double> residual, Eigen::VectorXd& dx, double& nis,
+              int from = 0) {
+    return visit([&](auto& p) { return p.update(accepted, residual, dx, nis, from); });
   }
   void shear(int first, const Eigen::MatrixX3d& u) {
     visit([&](auto& p) { p.shear(first, u); });

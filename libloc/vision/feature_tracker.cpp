@@ -15,20 +15,21 @@
 
 #include "libloc/core/check.hpp"
 #include "libloc/estimators/picture_rest.hpp"
-#include "libloc/geometry/absolute_pose.hpp"
 #include "libloc/geometry/camera.hpp"
 #include "libloc/vision/corner_detector.hpp"
+#include "libloc/vision/feature_tracker_work.hpp"
 #include "libloc/vision/image_view.hpp"
-#include "libloc/vision/map_search.hpp"
 #include "libloc/vision/patch.hpp"
 
 namespace loc {
+
+using namespace feature_tracker;
+
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
 constexpr double kWarpStep = 4;        // over which the warp's derivative is taken [px]
-constexpr double kFarthestAlign = 3;   // a place found otherwise is right to that [px]
 constexpr double kKltDisagrees = 1.5;  // two ways from the last picture to this one: not the same feature [px]
 constexpr int kMostKltSteps = 20;
 constexpr double kKltConverged = 0.03;  // [px]
@@ -36,26 +37,15 @@ constexpr double kKltEigenvalue = 1e-3;
 constexpr double kVagueGuess = 60;  // deviation of a place that is no guess any more [px]
 constexpr double kTwins = 5;        // two tracks nearer than this are one feature [px]
 constexpr int kBrightnessStep = 4;  // every so many pixels count for the mean brightness
-constexpr double kStillPx = 1;      // a picture that is nearer to where it was stands still …
-constexpr double kStillTime = 1;    // … when it has been for so long [s]
 constexpr TimeNs kLongestPauseNs = 1'000'000'000;
 constexpr double kMostSigmaPx = 30;    // of a standing picture; more says nothing either
 constexpr int kRemembered = 200;       // pictures in which nobody expects what is not seen
 constexpr double kMostPlaces = 20000;  // at which lost features are looked for in one picture: some 2 ms
-constexpr double kBorder = kPatchHalf + 2;
-constexpr double kGuidedPx = 4;             // deviation of a place by a pose that was found anew [px]
-constexpr double kFittingPx = 3;            // a feature that is where that pose says [px]
-constexpr std::size_t kFewestFitting = 10;  // for such a pose to be believed
-constexpr double kFittingPart = 0.6;        // of what looks right
 
 double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-struct Brightness {
-  double mean = 0;
-  double deviation = 0;
-};
 Brightness brightness_of(const cv::Mat& image) {
   double sum = 0;
   double squares = 0;
@@ -76,35 +66,6 @@ double largest_sigma(const Eigen::Matrix2d& cov) {
   const double half_trace = 0.5 * cov.trace();
   return std::sqrt(half_trace + std::sqrt(std::max(0.0, half_trace * half_trace - cov.determinant())));
 }
-
-// Where a patch was cut, for its warp: the camera's pose then, in the filter's world.
-struct Anchor {
-  Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
-  Pose3 T_world_camera;
-  bool has_pose = false;
-};
-
-struct Track {
-  std::int64_t id = -1;
-  ImagePatch patch;
-  Anchor anchor;
-  Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
-  Eigen::Vector2d last_px = Eigen::Vector2d::Zero();  // in the picture before
-  bool seen = false;                                  // in this picture
-  bool was_seen = false;                              // in the one before
-  int age = 0;
-  int unseen = 0;    // pictures since it was seen
-  int rejected = 0;  // in a row
-  bool in_map = false;
-  TrackOrigin origin = TrackOrigin::kNew;
-  double correlation = kUnknown;
-  const SlamFeaturePrediction* expected = nullptr;
-};
-
-struct Avoided {
-  Eigen::Vector2d pixel_px;
-  std::int64_t until;
-};
 
 }  // namespace
 
@@ -129,109 +90,6 @@ void FeatureTrackerOptions::check() const {
   require(exposure_step > 0, "exposure_step", exposure_step, "must be positive");
   require(std::isnan(sigma_px) || sigma_px > 0, "sigma_px", sigma_px, "must be positive, or NaN");
 }
-
-struct FeatureTracker::Work {
-  Work(const CameraCalibration& calibration, const FeatureTrackerOptions& given)
-      : camera(calibration),
-        options((given.check(), given)),
-        rest(calibration.intrinsics_px.tail<2>(), kStillPx, kStillTime),
-        map_search(camera) {
-    require(calibration.width_px >= 64 && calibration.height_px >= 64,
-            "camera: the picture is less than 64 pixels wide or high");
-    // Half as many cells again as there are tracks: some have no corner.
-    const double cell =
-        std::sqrt(static_cast<double>(calibration.width_px) * calibration.height_px / (1.5 * given.max_tracks));
-    corner_options.columns = std::max(2, static_cast<int>(std::lround(calibration.width_px / cell)));
-    corner_options.rows = std::max(2, static_cast<int>(std::lround(calibration.height_px / cell)));
-    corner_options.fast_threshold = given.fast_threshold;
-    corner_options.min_strength = given.min_corner;
-    corner_options.min_separation_px = given.min_separation_px;
-  }
-
-  Camera camera;
-  FeatureTrackerOptions options;
-  CornerOptions corner_options;
-  cv::Mat gray;
-  cv::Mat before_gray;
-  Brightness brightness;
-  Brightness before_brightness;
-  std::vector<cv::Mat> pyramid;
-  std::vector<cv::Mat> before_pyramid;
-  // The picture before, with the exposure of this one.
-  cv::Mat adjusted;
-  std::vector<cv::Mat> adjusted_pyramid;
-  bool is_adjusted = false;
-  std::vector<Track> tracks;
-  std::int64_t next_id = 0;
-  std::int64_t picture = 0;   // since the last reset
-  std::int64_t pictures = 0;  // in all
-  std::int64_t first_searched = 0;
-  Pose3 T_world_before;  // camera, of the picture before
-  bool has_before_pose = false;
-  FeaturesMeasurement out;
-  PictureRest rest;
-  TimeNs rest_time_ns = kNoTime;
-  int still_pictures = 0;  // in a row
-  std::vector<TrackedFeature> tracked;
-  FeatureTrackerTimes times;
-  std::vector<Avoided> avoided;
-  MapSearch map_search;
-  std::int64_t map_searches = 0;
-  std::int64_t maps_found = 0;
-  // Camera in the filter's world, where it is known; the warps of what is cut out now begin there.
-  std::optional<Pose3> T_world_camera;
-  // Room for one picture's work.
-  std::vector<std::size_t> klt;
-  std::vector<cv::Point2f> klt_from;
-  std::vector<cv::Point2f> klt_to;
-  std::vector<std::uint8_t> klt_status;
-  std::vector<float> klt_error;
-  std::vector<Eigen::Vector2d> taken;
-  std::vector<Corner> corners;
-  std::unordered_map<std::int64_t, const SlamFeaturePrediction*> by_id;
-  std::vector<MapPatch> map_patches;
-  std::vector<SightedPoint> sighted;
-  struct Place {
-    std::size_t track;
-    PatchMatch match;
-    bool fits = false;
-  };
-  std::vector<Place> found_places;
-  cv::Mat half;
-  std::int64_t searched = 0;
-  std::int64_t tracked_klt = 0;
-  std::int64_t cut_anew = 0;
-  std::int64_t refound = 0;
-  std::int64_t added = 0;
-  std::int64_t lost = 0;
-  std::int64_t moving = 0;
-  std::int64_t exposure_steps = 0;
-  std::int64_t blind = 0;
-
-  GrayView view() const { return {gray.data, gray.cols, gray.rows, static_cast<int>(gray.step)}; }
-  GrayView before_view() const {
-    return {before_gray.data, before_gray.cols, before_gray.rows, static_cast<int>(before_gray.step)};
-  }
-
-  void take_picture(const ImageMeasurement& image);
-  void take_prediction(const SlamPrediction* expected, const SlamPrediction* map);
-  Eigen::Matrix2d warp_of(const Track& track, const Pose3* now) const;
-  bool search(Track& track, const SlamPrediction* expected);
-  Eigen::Vector2d guess_of(const Track& track, const SlamPrediction* expected) const;
-  void run_klt(const SlamPrediction* expected);
-  void confirm(Track& track, const Eigen::Vector2d& place, const SlamPrediction* expected);
-  bool cut(Track& track, const Eigen::Vector2d& place) const;
-  std::optional<Pose3> pose_of_found(const Pose3& start);
-  void find_in_map(const SlamPrediction& map);
-  bool confirm_pose(const Pose3& pose);
-  void remove_twins();
-  double places_of(const SlamFeaturePrediction& there) const;
-  bool is_blind() const;
-  void forget_picture();
-  void detect();
-  void out_without(const ImageMeasurement& image);
-  void give_out(const ImageMeasurement& image);
-};
 
 void FeatureTracker::Work::take_picture(const ImageMeasurement& image) {
   const cv::Mat seen = view_of(image);
@@ -415,100 +273,6 @@ void FeatureTracker::Work::run_klt(const SlamPrediction* expected) {
     const Eigen::Vector2d place(klt_to[k].x, klt_to[k].y);
     if (klt_status[k] != 0 && camera.in_image(place, kBorder)) confirm(tracks[klt[k]], place, expected);
   }
-}
-
-// By what is seen of the map. nullopt when it does not fit together.
-std::optional<Pose3> FeatureTracker::Work::pose_of_found(const Pose3& start) {
-  sighted.clear();
-  for (const Track& track : tracks) {
-    if (!track.seen || track.expected == nullptr || !track.expected->placed) continue;
-    const auto ray = camera.unproject(track.pixel_px);
-    if (ray) sighted.push_back({track.expected->point / track.expected->weight, *ray});
-  }
-  if (sighted.size() < kFewestFitting) return std::nullopt;
-  AbsolutePoseOptions narrowing;
-  narrowing.last_width = 0.5 * kFittingPx / camera.intrinsics_px().head<2>().minCoeff();
-  narrowing.min_fitting = kFittingPart;
-  return absolute_pose(sighted, start, narrowing);
-}
-
-// The features where that pose says: enough of them, and these are the ones that are seen.
-bool FeatureTracker::Work::confirm_pose(const Pose3& pose) {
-  const Pose3 T_camera_world = pose.inverse();
-  found_places.clear();
-  const int farthest = static_cast<int>(std::ceil(options.search_sigmas * kGuidedPx));
-  for (std::size_t i = 0; i < tracks.size(); ++i) {
-    const Track& track = tracks[i];
-    if (track.expected == nullptr) continue;
-    const auto there = camera.project(T_camera_world.rotation * track.expected->point +
-                                      track.expected->weight * T_camera_world.translation);
-    WarpedPatch patch;
-    if (!there || !camera.in_image(*there, kBorder) || !track.patch.warp(warp_of(track, &pose), patch)) continue;
-    const PatchMatch coarse = search_patch(patch, view(), *there, kGuidedPx * kGuidedPx * Eigen::Matrix2d::Identity(),
-                                           options.search_sigmas, farthest);
-    if (!coarse.found || coarse.correlation < 0.6 * options.min_refind_correlation) continue;
-    const PatchMatch fine = align_patch(patch, view(), coarse.pixel_px, kFarthestAlign);
-    if (fine.found && fine.correlation >= options.min_refind_correlation)
-      found_places.push_back({.track = i, .match = fine});
-  }
-  sighted.clear();
-  for (const Place& place : found_places) {
-    const SlamFeaturePrediction& feature = *tracks[place.track].expected;
-    const auto ray = camera.unproject(place.match.pixel_px);
-    if (ray && feature.placed) sighted.push_back({feature.point / feature.weight, *ray});
-  }
-  if (sighted.size() < kFewestFitting) return false;
-  const double focal_px = camera.intrinsics_px().head<2>().minCoeff();
-  AbsolutePoseOptions narrowing;
-  narrowing.first_width = 2 * options.search_sigmas * kGuidedPx / focal_px;
-  narrowing.last_width = 0.5 * kFittingPx / focal_px;
-  narrowing.min_fitting = kFittingPart;
-  const auto better = absolute_pose(sighted, pose, narrowing);
-  if (!better) return false;
-  const Pose3 to_camera = better->inverse();
-  std::size_t fitting = 0;
-  for (Place& place : found_places) {
-    const SlamFeaturePrediction& feature = *tracks[place.track].expected;
-    const auto there = camera.project(to_camera.rotation * feature.point + feature.weight * to_camera.translation);
-    place.fits = there && (*there - place.match.pixel_px).norm() < kFittingPx;
-    fitting += place.fits && feature.placed ? 1 : 0;
-  }
-  if (fitting < kFewestFitting) return false;
-  for (Track& track : tracks) {
-    if (track.in_map) track.seen = false;
-  }
-  for (const Place& place : found_places) {
-    if (!place.fits) continue;
-    Track& track = tracks[place.track];
-    track.seen = true;
-    track.pixel_px = place.match.pixel_px;
-    track.correlation = place.match.correlation;
-    track.origin = TrackOrigin::kRefound;
-  }
-  T_world_camera = *better;
-  return true;
-}
-
-// The estimator is lost: in all of the picture, unless the tracks that are left agree on a pose.
-void FeatureTracker::Work::find_in_map(const SlamPrediction& map) {
-  ++map_searches;
-  auto pose = pose_of_found(map.T_world_camera);
-  if (!pose || !confirm_pose(*pose)) {
-    map_patches.clear();
-    for (const Track& track : tracks) {
-      if (track.expected == nullptr || !track.expected->placed) continue;
-      map_patches.push_back({&track.patch, track.expected->point / track.expected->weight});
-    }
-    if (pyramid.size() > 2) {
-      half = pyramid[2];  // every second one is of derivatives
-    } else {
-      cv::pyrDown(gray, half);
-    }
-    const GrayView half_view{half.data, half.cols, half.rows, static_cast<int>(half.step)};
-    pose = map_search.find(view(), half_view, map_patches, map.T_world_camera, map_searches);
-    if (!pose || !confirm_pose(*pose)) return;
-  }
-  ++maps_found;
 }
 
 // Two tracks on one feature: the older one stays.

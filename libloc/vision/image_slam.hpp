@@ -14,12 +14,18 @@ namespace loc {
 
 /// Settings of the filter for tracks of FeatureTracker, where they differ from the general ones: pixels as good as the
 /// tracker says by default (for search ellipses), features that stay inverse depth for longer, and for a camera alone
-/// the noise of second order, since pictures may begin in a turn. FeatureTracker looks for the map where it was lost.
+/// the noise of second order, since pictures may begin in a turn, and care with what appears where something hides the
+/// map. FeatureTracker looks for the map where it was lost.
 inline SlamOptions slam_options_for_images(SlamOptions options) {
   options.sigma_px = 1;
   options.map.max_linearity_index = 0.03;
   options.second_order_noise = options.motion == SlamMotion::kConstantVelocity;
   options.relocate_s = 2;
+  if (options.motion == SlamMotion::kConstantVelocity) {
+    // Where nothing but the picture tells what moves.
+    options.map.steer_after_frames = 20;
+    options.map.cover_radius_px = 0.09 * options.camera.width_px;
+  }
   return options;
 }
 

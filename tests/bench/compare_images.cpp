@@ -59,32 +59,16 @@ struct Case {
   Change change = [](double, const ImageMeasurement& image) { return std::optional(image); };
 };
 
-/// Four figures of a tenth of the picture each, walking both ways.
-ImageMeasurement with_crowd(double t, const ImageMeasurement& image) {
-  const double w = image.width_px;
-  const double h = image.height_px;
-  const double speeds[] = {0.09, -0.11, 0.13, -0.07};  // of the picture's width in a second
-  const double places[] = {0.1, 0.5, 0.55, 0.95};
-  ImageMeasurement out = image;
-  for (int i = 0; i < 4; ++i) {
-    const double middle = w * (places[i] + speeds[i] * (t - 3));
-    out = test::covered(out, {.left = middle - 0.065 * w,
-                              .top = (0.15 + 0.02 * i) * h,
-                              .width = static_cast<int>(0.13 * w),
-                              .height = static_cast<int>(0.78 * h),
-                              .pattern = static_cast<std::uint64_t>(i) + 11});
-  }
-  return out;
-}
-
 std::vector<Case> cases() {
   const auto between = [](double t, double begin, double end) { return t >= begin && t < end; };
   return {{.name = "plain"},
           {.name = "pure rotation, 2 s", .pauses = {{3, 5}}, .turn = 0.5},
           {.name = "stop and go", .pauses = {{2.5, 4}, {5.5, 6.5}}},
           {.name = "crowd on 40 %, 3 s",
-           .change = [=](double t,
-                         const ImageMeasurement& i) { return std::optional(between(t, 3, 6) ? with_crowd(t, i) : i); }},
+           .change =
+               [=](double t, const ImageMeasurement& i) {
+                 return std::optional(between(t, 3, 6) ? test::with_crowd(t - 3, i) : i);
+               }},
           {.name = "exposure x 1.5, x 0.6",
            .change =
                [=](double t, const ImageMeasurement& i) {

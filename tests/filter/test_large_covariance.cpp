@@ -103,6 +103,17 @@ void update_is_the_textbooks(double tolerance) {
   ASSERT_TRUE(covariance.correction(accepted, given, dx));
   EXPECT_TRUE(test::near(dx, Eigen::VectorXd(gain * residual_in), tolerance));
   EXPECT_TRUE(test::near(covariance.dense(), p, tolerance)) << "a correction alone leaves P";
+  // With the head and the first block left as they are: any gain, here one with rows of zero, by Joseph.
+  constexpr int kFrom = kHead + 6;
+  LargeCovariance<Scalar> considering = covariance;
+  Eigen::MatrixXd some_gain = gain;
+  some_gain.topRows(kFrom).setZero();
+  const Eigen::MatrixXd left = Eigen::MatrixXd::Identity(kDim, kDim) - some_gain * h_in;
+  ASSERT_TRUE(considering.update(accepted, given, dx, nis, kFrom));
+  EXPECT_TRUE(test::near(dx, Eigen::VectorXd(some_gain * residual_in), tolerance));
+  EXPECT_TRUE(test::near(considering.dense(),
+                         Eigen::MatrixXd(left * p * left.transpose() + some_gain * r_in * some_gain.transpose()),
+                         tolerance));
   ASSERT_TRUE(covariance.update(accepted, given, dx, nis));
   EXPECT_TRUE(test::near(dx, Eigen::VectorXd(gain * residual_in), tolerance));
   EXPECT_NEAR(nis, residual_in.dot(s_in.ldlt().solve(residual_in)), 10 * tolerance);

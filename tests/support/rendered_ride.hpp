@@ -113,6 +113,24 @@ inline ImageMeasurement covered(const ImageMeasurement& image, const Cover& cove
   });
 }
 
+/// Four figures of a tenth of the picture each, walking both ways; at their places at time 0.
+inline ImageMeasurement with_crowd(double time_s, const ImageMeasurement& image) {
+  const double w = image.width_px;
+  const double h = image.height_px;
+  const double speeds[] = {0.09, -0.11, 0.13, -0.07};  // of the picture's width in a second
+  const double places[] = {0.1, 0.5, 0.55, 0.95};
+  ImageMeasurement out = image;
+  for (int i = 0; i < 4; ++i) {
+    const double middle = w * (places[i] + speeds[i] * time_s);
+    out = covered(out, {.left = middle - 0.065 * w,
+                        .top = (0.15 + 0.02 * i) * h,
+                        .width = static_cast<int>(0.13 * w),
+                        .height = static_cast<int>(0.78 * h),
+                        .pattern = static_cast<std::uint64_t>(i) + 11});
+  }
+  return out;
+}
+
 /// Pictures of a room from given poses.
 class RoomCamera {
  public:
