@@ -147,7 +147,7 @@ TEST(Scene3d, DrawsThingsWhereTheyAre) {
   const auto pixel = [&](double x, double y, double z) { return *project(eye, {x, y, z}, kWidth, kHeight); };
   EXPECT_TRUE(has_colour(image, pixel(0.2, 0, 1), kBlue)) << "the way from point to point is drawn";
   EXPECT_TRUE(has_colour(image, pixel(2.4, 0, 1), kBlue));
-  EXPECT_FALSE(has_colour(image, pixel(3.0, 0, 1), kBlue)) << "a new start is not joined";
+  EXPECT_FALSE(has_colour(image, pixel(3.0, 0, 1), kRed)) << "a new start is not joined";
   EXPECT_TRUE(has_colour(image, pixel(3.6, 0, 1), kRed)) << "lost";
   EXPECT_TRUE(has_colour(image, pixel(-3, 1.5, 0), kGreen));
   EXPECT_TRUE(has_colour(image, pixel(-2, -1.5, 0.5), kOrange));
