@@ -325,7 +325,8 @@ def draw_from_above(axes, run: Run, comparison: Comparison) -> None:
     if near.any():
         axes.plot(*points[near, :2].T, ".", color="tab:purple", ms=3, label="map")
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set(xlabel="x [m]", ylabel="y [m]")
+    unit = "" if comparison.truth is None and run.method != "inertial-slam" else " [m]"
+    axes.set(xlabel=f"x{unit}", ylabel=f"y{unit}")
     axes.legend(fontsize=8, loc="best")
     axes.set_title("from above", fontsize=10)
     axes.grid(alpha=0.3)

@@ -127,9 +127,10 @@ def test_replay_is_compared_bit_for_bit(tmp_path):
         (["setup"], 2, "tools/setup demo"),
         (["setup", "everything"], 2, "tools/setup demo"),
         (["demo", "--nonsense"], 1, "--nonsense: no such option"),
+        (["demo", "nowhere"], 1, "nowhere: no folder in the EuRoC layout"),
         (["test", "--nonsense"], 1, "--nonsense: no such option"),
         (["test", "--help"], 0, "--no-sanitize"),
-        (["demo", "--help"], 0, "--generated"),
+        (["demo", "--help"], 0, "--street"),
     ],
 )
 def test_options_of_the_commands(command, code, says, tmp_path):
