@@ -11,6 +11,7 @@ constexpr TimeNs kGrid = 10'000'000;
 constexpr TimeNs kStep = 20'000'000;         // between the offsets that are tried
 constexpr TimeNs kFarthest = 2'000'000'000;  // offset
 constexpr TimeNs kWindow = 10'000'000'000;
+constexpr auto kMost = static_cast<std::size_t>((kWindow + 4 * kFarthest) / kGrid);
 constexpr TimeNs kEvery = 2'000'000'000;  // judgement
 constexpr TimeNs kGap = 500'000'000;
 constexpr std::size_t kFewestTurns = 60;
@@ -29,7 +30,11 @@ constexpr double kSame = 0.1;          // two judgements in a row [s]
 StampWatch::StampWatch(const CameraCalibration& camera)
     : camera_(camera),
       body_camera_(camera.T_body_camera.rotation.toRotationMatrix()),
-      offset_ns_(from_seconds(camera.time_offset_s)) {}
+      offset_ns_(from_seconds(camera.time_offset_s)) {
+  // Room for all, so that nothing is allocated later.
+  for (std::size_t i = 0; i <= kMost; ++i) angles_.push_back(angle_);
+  while (!angles_.empty()) angles_.drop_front();
+}
 
 void StampWatch::reset() {
   while (!angles_.empty()) angles_.drop_front();
@@ -58,7 +63,6 @@ void StampWatch::see(const ImuMeasurement& imu) {
     angles_.push_back(before + part * (angle_ - before));
   }
   imu_ns_ = imu.time_ns;
-  constexpr auto kMost = static_cast<std::size_t>((kWindow + 4 * kFarthest) / kGrid);
   while (angles_.size() > kMost) {
     angles_.drop_front();
     grid_ns_ += kGrid;
@@ -165,7 +169,8 @@ void StampWatch::judge() {
   while (to > from && turns_[to - 1].end_ns - turns_[from].begin_ns > kWindow) ++from;
   if (to - from < kFewestTurns) return;
 
-  std::vector<std::pair<TimeNs, double>> found;
+  std::vector<std::pair<TimeNs, double>>& found = found_;
+  found.clear();
   for (TimeNs shift = -kFarthest; shift <= kFarthest; shift += kStep) {
     double correlation = 0;
     if (correlate(shift, from, to, correlation)) found.emplace_back(shift, correlation);

@@ -59,6 +59,7 @@ class StampWatch {
   TimeNs frame_ns_ = kNoTime;
   std::vector<std::pair<std::int64_t, Eigen::Vector3d>> last_;  // identity, direction; ascending
   mutable std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> pairs_;
+  std::vector<std::pair<TimeNs, double>> found_;  // offset, correlation
   TimeNs judged_ns_ = kNoTime;
   double before_s_ = kUnknown;  // what the last judgement found
   double offset_s_ = kUnknown;
