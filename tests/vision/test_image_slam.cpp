@@ -156,7 +156,7 @@ constexpr int kCoverTo = 50;
 constexpr int kPicturesInAll = 62;
 
 // It says that it is lost after lost_after_s, with a covariance that covers how far it is off, finds itself again once,
-// and is right then. Without looking for the map it is half a metre off in the end.
+// and is right then.
 TEST(ImageSlam, CoveredWhollyItIsLostAndSaysSoAndFindsItselfAgain) {
   for (const Covered& cover : covers()) {
     SCOPED_TRACE(cover.name);
