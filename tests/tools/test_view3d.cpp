@@ -358,6 +358,8 @@ TEST(SceneRecorder, WhatIsOlderComesIntoTheWorldThatGpsGives) {
   EXPECT_NEAR((scene.gps.front() - T_world_map.translation).norm(), 0, 1e-3);
   ASSERT_TRUE(scene.points[0].ray);
   EXPECT_NEAR((scene.points[0].ray->anchor - T_world_map.translation).norm(), 0, 1e-9);
+  recorder.take("LOC_MAP", encode(Ride::map(10.005)));
+  EXPECT_NEAR(recorder.scene().points[1].position_cov(0, 0), 1 - 0.01, 1e-12) << "less what it shares with the pose";
 }
 
 TEST(SceneRecorder, AConvertedFeatureIsAPoint) {

@@ -217,6 +217,8 @@ void SceneRecorder::take_map(std::span<const std::uint8_t> data) {
   }
   std::erase_if(anchors_, [&](const auto& a) { return !map.contains(a.first) && !in_frame.contains(a.first); });
   map_ = std::move(map);
+  const bool tied = origin_ && (estimate_.valid & kValidCovariance) != 0 && estimate_.covariance_dim >= 6;
+  shared_cov_ = tied ? estimate_.covariance.block<3, 3>(3, 3).eval() : Eigen::Matrix3d::Zero().eval();
 }
 
 void SceneRecorder::take_measurement(std::string_view channel, std::span<const std::uint8_t> data,
@@ -288,13 +290,14 @@ void SceneRecorder::add_points(Scene3d& scene) const {
     }
   }
   for (const auto& [id, point] : map_) {
-    ScenePoint out{id, point.position, point.covariance, used.contains(id), {}};
+    const Eigen::Matrix3d covariance = point.covariance - shared_cov_;
+    ScenePoint out{id, point.position, covariance, used.contains(id), {}};
     if (const auto anchor = anchors_.find(id); anchor != anchors_.end()) {
       const Eigen::Vector3d ray = point.position - anchor->second;
       const double distance = ray.norm();
       if (distance > 0) {
         // The covariance is that of the inverse depth, taken to a point by its derivative, 1 / rho^2.
-        const double sigma = std::sqrt(std::max(0.0, ray.dot(point.covariance * ray))) / distance;
+        const double sigma = std::sqrt(std::max(0.0, ray.dot(covariance * ray))) / distance;
         out.ray = SceneRay{anchor->second, 1 / distance, sigma / (distance * distance)};
       }
     }

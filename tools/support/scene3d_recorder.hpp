@@ -42,7 +42,9 @@ class SceneRecorder {
   /// Time of the newest estimate or frame, on the clock of the measurements; kNoTime before the first.
   TimeNs time_ns() const { return time_ns_; }
   TimeNs first_time_ns() const { return first_time_ns_; }
-  /// What there is to see now. Decodes the newest picture and lays the tracks over each other: milliseconds.
+  /// What there is to see now. Of the points of a map that GPS has tied to the Earth, the uncertainty that they share
+  /// with the pose is left out: they would all look alike otherwise. Decodes the newest picture and lays the tracks
+  /// over each other: milliseconds.
   Scene3d scene() const;
 
   /// {"estimates", 200}, {"frames", 20}, …, {"undecodable:LOC_IMAGE", 1}, and what the decoder skipped.
@@ -85,8 +87,9 @@ class SceneRecorder {
   std::optional<GeodeticPoint> origin_;
   std::optional<SlamFrame> frame_;
   std::map<std::int64_t, MapPoint> map_;
-  std::map<std::int64_t, Eigen::Vector3d> anchors_;  // of the features that are in the map
-  std::deque<ImageMeasurement> pictures_;            // the newest few; a frame comes after its picture
+  Eigen::Matrix3d shared_cov_ = Eigen::Matrix3d::Zero();  // of all its points, where GPS has tied it to the Earth
+  std::map<std::int64_t, Eigen::Vector3d> anchors_;       // of the features that are in the map
+  std::deque<ImageMeasurement> pictures_;                 // the newest few; a frame comes after its picture
   std::vector<std::string> conditions_;
   TimeNs conditions_time_ns_ = kNoTime;
   Track trajectory_;
