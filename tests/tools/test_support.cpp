@@ -68,6 +68,21 @@ TEST(InputQueues, FullQueuesDropAsTold) {
             "imu.dropped=3 imu.oversized=1 imu.waiting_max=2 image.dropped=3 image.oversized=0 image.waiting_max=2");
 }
 
+// Thousands of IMU messages may wait, a few pictures: the memory of pictures must not wander into the IMU's queue.
+TEST(InputQueues, BuffersStayInTheirQueue) {
+  InputQueues queues({{"imu", 64, 1 << 20}, {"image", 2, 1 << 20, 0, WhenFull::kDropOldest}});
+  RawMessage message;
+  for (int i = 0; i < 300; ++i) {
+    queues.push(1, Bytes(100'000, 1), 0);
+    queues.push(0, Bytes(10, 2), 0);
+    ASSERT_TRUE(queues.pop(message, 0));
+    EXPECT_EQ(message.bytes, Bytes(100'000, 1));
+    ASSERT_TRUE(queues.pop(message, 0));
+    EXPECT_EQ(message.bytes, Bytes(10, 2));
+    ASSERT_LT(message.bytes.capacity(), 1000U) << i;
+  }
+}
+
 TEST(InputQueues, WakesTheOneThatWaits) {
   InputQueues queues({{"a", 4, 100}});
   std::thread sender([&] { queues.push(0, Bytes{7}, 0); });

@@ -58,7 +58,12 @@ bool InputQueues::pop(RawMessage& out, TimeNs timeout_ns) {
     if (queue.size == 0) continue;
     if (oldest == nullptr || queue.ring[queue.first].arrival < oldest->ring[oldest->first].arrival) oldest = &queue;
   }
+  // The buffer in out goes back to the queue that it came from: a queue of thousands of short messages would hold
+  // thousands of pictures' buffers otherwise.
+  if (out.input < queues_.size()) queues_[out.input].spare.swap(out.bytes);
+  std::vector<std::uint8_t> buffer = std::move(oldest->spare);
   std::swap(out, oldest->ring[oldest->first]);
+  oldest->ring[oldest->first].bytes = std::move(buffer);
   oldest->first = (oldest->first + 1) % oldest->ring.size();
   --oldest->size;
   --waiting_;

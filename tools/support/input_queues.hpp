@@ -42,8 +42,8 @@ class InputQueues {
 
   /// @return false when a message was lost by it (this one, or the oldest): counted.
   bool push(std::size_t input, std::span<const std::uint8_t> bytes, TimeNs receive_time_ns);
-  /// The message that arrived first of all that wait. Its buffer is exchanged with that of out, so pass the same out
-  /// again. @return false when none came in time.
+  /// The message that arrived first of all that wait. Its buffer is lent to out and taken back when out is passed
+  /// again: do so. @return false when none came in time.
   bool pop(RawMessage& out, TimeNs timeout_ns);
 
   std::int64_t dropped(std::size_t input) const;
@@ -55,6 +55,7 @@ class InputQueues {
   struct Queue {
     InputQueueOptions options;
     std::vector<RawMessage> ring;
+    std::vector<std::uint8_t> spare;  // buffer of the last message that was taken out and given back
     std::size_t first = 0;
     std::size_t size = 0;
     std::size_t most = 0;
