@@ -141,6 +141,9 @@ def main() -> int:
     parser.add_argument("--programs", type=Path, required=True, help="folder with loc-driver and the others")
     parser.add_argument("--minutes", type=float, default=0.5)
     parser.add_argument("--udp", action="store_true")
+    parser.add_argument(
+        "--reorder-delay-ms", default="50", help="of loc-estimator: how long IMU samples wait for pictures"
+    )
     parser.add_argument("--view", help="a viewer to run beside it, with its arguments")
     parser.add_argument(
         "--work", type=Path, help="folder for input, log and log lines (default: a temporary one)"
@@ -173,6 +176,7 @@ def main() -> int:
             [
                 *(options.programs / "loc-estimator", "--method", "inertial-slam", "--images"),
                 *("--rig", write_rig(options.programs, folder), "--lcm-url", url, "--exit-at-end"),
+                *("--reorder-delay-ms", options.reorder_delay_ms),
             ],
             folder / "estimator.log",
         )
