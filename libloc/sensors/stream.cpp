@@ -12,6 +12,8 @@ namespace {
 // Place among samples of one time, by StreamKind.
 constexpr std::array<int, kStreamKinds> kRank = {6, 0, 1, 3, 5, 4, 2};
 
+constexpr TimeNs kQuietPart = 4;  // tenths of an interval
+
 // a - b; far apart times give the largest difference there is instead of an overflow.
 TimeNs difference(TimeNs a, TimeNs b) {
   TimeNs result = 0;
@@ -82,6 +84,9 @@ void StreamMerger::push(Measurement measurement) {
 void StreamMerger::accept(Measurement measurement) {
   const TimeNs time = time_of(measurement);
   Queue& queue = queues_[queue_of(measurement)];
+  if (has_camera(kind_of(measurement)) && queue.newest != kNoTime && time > queue.newest) {
+    queue.see_interval(difference(time, queue.newest));
+  }
   queue.newest = std::max(queue.newest, time);
   newest_ = std::max(newest_, time);
   // Nearly always at the end; equal times keep their order of arrival.
@@ -89,6 +94,17 @@ void StreamMerger::accept(Measurement measurement) {
   while (place > 0 && time_of(queue.samples[place - 1]) > time) --place;
   queue.samples.insert(place, std::move(measurement));
   ++waiting_;
+}
+
+// A camera that is regular but for dropped pictures; of another one nothing can be expected.
+void StreamMerger::Queue::see_interval(TimeNs interval) {
+  intervals[intervals_seen++ % intervals.size()] = interval;
+  quiet = 0;
+  if (intervals_seen < intervals.size()) return;
+  auto sorted = intervals;
+  std::sort(sorted.begin(), sorted.end());
+  const TimeNs shortest = sorted.front();
+  if (sorted[sorted.size() / 2] - shortest <= shortest / 4) quiet = kQuietPart * (shortest / 10);
 }
 
 void StreamMerger::accept_suspects_until(TimeNs time) {
@@ -123,6 +139,8 @@ void StreamMerger::start_anew() {
   finished_ = was_finished;
   for (Queue& queue : queues_) {
     queue.newest = kNoTime;
+    queue.intervals_seen = 0;
+    queue.quiet = 0;
     queue.late_in_a_row = 0;
     queue.stepped_back = false;
   }
@@ -154,7 +172,7 @@ std::optional<Measurement> StreamMerger::pop() {
   const TimeNs time = first_key.first;
   const bool waited_out = options_.max_delay_ns == 0 || difference(newest_, time) > options_.max_delay_ns;
   const auto passed = [time](const Queue& queue) {
-    return !queue.awaited || (queue.newest != kNoTime && queue.newest >= time);
+    return !queue.awaited || (queue.newest != kNoTime && difference(time, queue.newest) <= queue.quiet);
   };
   if (!finished_ && !waited_out && !std::all_of(queues_.begin(), queues_.end(), passed)) {
     if (waiting() <= options_.max_samples) return std::nullopt;

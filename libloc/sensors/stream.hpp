@@ -1,8 +1,10 @@
 // Merges the samples of several streams into one sequence in time order, with a bounded delay: a sample leaves when
 // every stream that is awaited has passed its time, or when it has waited for more than max_delay of measurement time.
 // What comes too late for that (older than what has left already) is dropped and counted, never put out of order.
-// As long as each stream is in order, none is later than max_delay and all are awaited before their first sample, the
-// result does not depend on the order of arrival: live and off line agree.
+// Cameras are slow, and what follows a picture need not wait for the next one: a regular stream of pictures counts as
+// passed for a part of the shortest of its last intervals after each of them. (One that comes much earlier than all
+// before it is late then.) As long as each stream is in order, none is later than max_delay and all are awaited before
+// their first sample, the result does not depend on the order of arrival: live and off line agree.
 //
 // Clocks that jump. Set back: the times of a stream step back and what follows is late; after reset_after such samples
 // in a row, all that waits leaves and the sequence starts anew from there (counted; who feeds an estimator resets it
@@ -65,6 +67,12 @@ class StreamMerger {
     bool awaited = false;
     bool stepped_back = false;  // its time did, and what came since was late
     int late_in_a_row = 0;      // since then
+    // Of a camera: its last intervals, and for how long after a picture the next one is not expected.
+    std::array<TimeNs, 16> intervals{};
+    std::size_t intervals_seen = 0;
+    TimeNs quiet = 0;
+
+    void see_interval(TimeNs interval);
   };
   // Cameras share times, so each has queues of its own for images and features; those past the last share it.
   static constexpr std::size_t kCameraQueues = 8;

@@ -160,6 +160,35 @@ TEST(StreamMerger, ASampleLeavesAsSoonAsAllAwaitedStreamsHavePassedIt) {
   EXPECT_FALSE(merger.pop());  // the IMU may still send something older than the magnetometer's sample
 }
 
+// What follows a picture at once need not wait for the next one; what follows late must.
+TEST(StreamMerger, ARegularCameraIsNotWaitedForRightAfterAPicture) {
+  const auto waits = [](const std::vector<TimeNs>& pictures, TimeNs after) {
+    StreamMerger merger({.max_delay_ns = kSecond});
+    merger.await(StreamKind::kImu);
+    std::vector<Key> out;
+    for (const TimeNs time : pictures) {
+      merger.push(image(kEpoch + time, 0));
+      merger.push(imu(kEpoch + time));
+      drain(merger, out);
+    }
+    merger.push(imu(kEpoch + pictures.back() + after));
+    return !merger.pop().has_value();
+  };
+  std::vector<TimeNs> regular;
+  for (int i = 0; i < 20; ++i) regular.push_back(i * 33 * kMs + (i % 3) * kMs);
+  EXPECT_FALSE(waits(regular, 5 * kMs));
+  EXPECT_FALSE(waits(regular, 12 * kMs));
+  EXPECT_TRUE(waits(regular, 15 * kMs));
+  // Nothing is expected of the first pictures, and of a camera that takes them as it likes.
+  EXPECT_TRUE(waits({regular.begin(), regular.begin() + 10}, 5 * kMs));
+  std::vector<TimeNs> irregular;
+  for (int i = 0; i < 20; ++i) irregular.push_back(i * 33 * kMs + (i % 2) * 20 * kMs);
+  EXPECT_TRUE(waits(irregular, 5 * kMs));
+  // Dropped pictures do not make it irregular.
+  regular.erase(regular.begin() + 12);
+  EXPECT_FALSE(waits(regular, 5 * kMs));
+}
+
 TEST(StreamMerger, ASilentStreamHoldsTheOthersForMaxDelayOnly) {
   StreamMerger merger;
   merger.await(StreamKind::kGps);
