@@ -112,7 +112,11 @@ loc::EstimatorSettings settings_of(const Arguments& arguments, const loc::Rig& r
     settings.slam = loc::slam_options(arguments.slam, arguments.method, rig, usual);
     settings.slam_start = loc::slam_start(arguments.slam, settings.slam);
     const bool inertial = settings.slam.motion == loc::SlamMotion::kInertial;
-    if (!arguments.fusion.no_gps) settings.anchor = loc::anchor_options(arguments.fusion, inertial, rig);
+    if (!arguments.fusion.no_gps) {
+      settings.anchor = loc::anchor_options(arguments.fusion, inertial, rig);
+      // Fixes do not wait for the other streams, which may be late by so much.
+      settings.anchor->gps_max_ahead_s += arguments.reorder_delay_ms * 1e-3;
+    }
     return settings;
   }
   settings.fusion = loc::fusion_options(arguments.fusion, arguments.preset, rig);

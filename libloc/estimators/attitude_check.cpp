@@ -7,6 +7,11 @@
 #include "libloc/geometry/so3.hpp"
 
 namespace loc {
+namespace {
+
+constexpr double kLongestHold = 1;  // of an estimate against the samples [s]
+
+}  // namespace
 
 void AttitudeCheckOptions::check() const {
   require_positive("average_s", average_s);
@@ -21,7 +26,8 @@ AttitudeCheck::AttitudeCheck(const AttitudeCheckOptions& options)
 
 void AttitudeCheck::reset() {
   filter_.reset();
-  begin_ns_ = last_ns_ = compared_ns_ = kNoTime;
+  begin_ns_ = compared_ns_ = kNoTime;
+  while (!opinions_.empty()) opinions_.drop_front();
   difference_.setZero();
   averaged_s_ = 0;
 }
@@ -29,28 +35,39 @@ void AttitudeCheck::reset() {
 void AttitudeCheck::see(const Measurement& measurement) {
   const bool made = filter_.process(measurement);
   if (!made || kind_of(measurement) != StreamKind::kImu) return;
-  last_ns_ = stamp_of(measurement).time_ns;
+  const TimeNs now = stamp_of(measurement).time_ns;
   const bool anew = (filter_.status() & (kReinitialised | kInitialising)) != 0;
-  if (anew || begin_ns_ == kNoTime || last_ns_ < begin_ns_) {
-    begin_ns_ = last_ns_;
+  if (anew || begin_ns_ == kNoTime || now < begin_ns_) {
+    begin_ns_ = now;
     compared_ns_ = kNoTime;
     averaged_s_ = 0;
     difference_.setZero();
+    while (!opinions_.empty()) opinions_.drop_front();
   }
+  constexpr std::uint32_t kNoField = kMagnetometerMissing | kMagnetometerDisturbed | kMagnetometerIgnored;
+  const bool north = (filter_.status() & kNoField) == 0 && (filter_.estimate().valid & kValidHeading) != 0;
+  opinions_.push_back({now, filter_.orientation(), north});
+  while (to_seconds(now - opinions_.front().time_ns) > kLongestHold) opinions_.drop_front();
 }
 
-bool AttitudeCheck::settled(const Estimate& estimate) const {
-  return (estimate.valid & kValidOrientation) != 0 && estimate.time_ns == last_ns_ &&
-         to_seconds(last_ns_ - begin_ns_) >= options_.start_s;
+const AttitudeCheck::Opinion* AttitudeCheck::at(const Estimate& estimate) const {
+  if ((estimate.valid & kValidOrientation) == 0) return nullptr;
+  for (std::size_t i = opinions_.size(); i > 0; --i) {
+    const Opinion& opinion = opinions_[i - 1];
+    if (opinion.time_ns > estimate.time_ns) continue;
+    const bool settled = to_seconds(opinion.time_ns - begin_ns_) >= options_.start_s;
+    return opinion.time_ns == estimate.time_ns && settled ? &opinion : nullptr;
+  }
+  return nullptr;
 }
 
 std::uint32_t AttitudeCheck::compare(const Estimate& estimate) {
-  if (settled(estimate)) {
+  if (const Opinion* opinion = at(estimate)) {
     const double dt = compared_ns_ == kNoTime ? 0 : std::max(0.0, to_seconds(estimate.time_ns - compared_ns_));
     compared_ns_ = estimate.time_ns;
     averaged_s_ = std::min(averaged_s_ + dt, options_.average_s);
     // The vertical that the accelerometers say, in the estimate's world.
-    const Eigen::Vector3d up_in_body = filter_.orientation().inverse() * Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d up_in_body = opinion->q_world_body.inverse() * Eigen::Vector3d::UnitZ();
     const Eigen::Vector3d off = estimate.q_world_body * up_in_body - Eigen::Vector3d::UnitZ();
     const double share = averaged_s_ > 0 ? std::min(1.0, dt / averaged_s_) : 1;
     difference_ += share * (off - difference_);
@@ -66,12 +83,10 @@ std::uint32_t AttitudeCheck::compare(const Estimate& estimate) {
 }
 
 std::optional<double> AttitudeCheck::heading_of_world(const Estimate& estimate) const {
-  constexpr std::uint32_t kNoField = kMagnetometerMissing | kMagnetometerDisturbed | kMagnetometerIgnored;
-  if (!settled(estimate) || (filter_.status() & kNoField) != 0) return std::nullopt;
-  const Estimate other = filter_.estimate();
-  if ((other.valid & kValidHeading) == 0) return std::nullopt;
+  const Opinion* opinion = at(estimate);
+  if (opinion == nullptr || !opinion->has_north) return std::nullopt;
   // Both turn the same body; what lies between their worlds is a turn about the vertical, but for errors of the tilt.
-  return so3::heading(other.q_world_body * estimate.q_world_body.inverse());
+  return so3::heading(opinion->q_world_body * estimate.q_world_body.inverse());
 }
 
 }  // namespace loc

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "libloc/core/fifo.hpp"
 #include "libloc/estimators/estimate.hpp"
 #include "libloc/estimators/madgwick.hpp"
 #include "libloc/sensors/measurements.hpp"
@@ -29,9 +30,9 @@ class AttitudeCheck {
   /// @throws std::invalid_argument as AttitudeCheckOptions::check.
   explicit AttitudeCheck(const AttitudeCheckOptions& options = {});
 
-  /// IMU and magnetometer samples, in time order; others are left aside.
+  /// IMU samples and those of a magnetometer, each in time order; others are left aside.
   void see(const Measurement& measurement);
-  /// An estimate whose world has z up, right after the IMU sample that it rests upon.
+  /// An estimate whose world has z up, at the time of one of the IMU samples of the last second.
   /// @returns kTiltDoubtful while they disagree, otherwise 0
   std::uint32_t compare(const Estimate& estimate);
   /// Where the x axis of the estimate's world points by the magnetometer, from (magnetic) east to north [rad]; nothing
@@ -42,12 +43,18 @@ class AttitudeCheck {
   void reset();
 
  private:
-  bool settled(const Estimate& estimate) const;
+  // What Madgwick's filter said after a sample. An estimate may rest upon an older sample than the last one.
+  struct Opinion {
+    TimeNs time_ns = kNoTime;
+    Eigen::Quaterniond q_world_body;
+    bool has_north = false;
+  };
+  const Opinion* at(const Estimate& estimate) const;
 
   AttitudeCheckOptions options_;
   MadgwickFilter filter_;
   TimeNs begin_ns_ = kNoTime;
-  TimeNs last_ns_ = kNoTime;  // sample
+  Fifo<Opinion> opinions_;  // of the last second
   TimeNs compared_ns_ = kNoTime;
   Eigen::Vector3d difference_ = Eigen::Vector3d::Zero();  // of the verticals, averaged, axes of world
   double averaged_s_ = 0;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "libloc/core/check.hpp"
@@ -10,6 +11,7 @@ namespace loc {
 namespace {
 
 constexpr double kMostVariance = 1e14;
+constexpr double kHighest = 1e7;  // that a receiver can be [m]
 
 double square(double x) {
   return x * x;
@@ -63,6 +65,7 @@ GpsRefusal gps_place(const GpsMeasurement& gps, GeodeticPoint& place) {
   if (gps.fix < GpsFixType::k2d) return GpsRefusal::kNoFix;
   if (!std::isfinite(gps.latitude) || !std::isfinite(gps.longitude)) return GpsRefusal::kNotFinite;
   if (std::abs(gps.latitude) > std::numbers::pi / 2) return GpsRefusal::kOutOfRange;
+  if (std::isfinite(gps.altitude) && std::abs(gps.altitude) > kHighest) return GpsRefusal::kOutOfRange;
   place = {gps.latitude, gps.longitude, std::isfinite(gps.altitude) ? gps.altitude : 0};
   return GpsRefusal::kNone;
 }
@@ -82,7 +85,9 @@ GpsRefusal gps_in_world(const GpsMeasurement& gps, const GpsErrorModel& errors, 
   const bool carrier_phase = gps.fix >= GpsFixType::kFloat;
   raise(out.position_cov, carrier_phase ? 0 : errors.gps_sigma_floor, errors.gps_vertical_factor);
   if (errors.gps_correlation_time_s > 0 && !carrier_phase && before_ns != kNoTime) {
-    const double apart = std::abs(to_seconds(gps.time_ns - before_ns));
+    TimeNs since = 0;
+    const bool far = __builtin_sub_overflow(gps.time_ns, before_ns, &since);
+    const double apart = far ? std::numeric_limits<double>::infinity() : std::abs(to_seconds(since));
     if (apart == 0) return GpsRefusal::kRepeated;
     const double phi = std::exp(-apart / errors.gps_correlation_time_s);
     out.position_cov *= (1 + phi) / (1 - phi);

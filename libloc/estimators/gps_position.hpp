@@ -42,7 +42,8 @@ enum class GpsRefusal : std::uint8_t { kNone, kNoFix, kNotFinite, kOutOfRange, k
 /// A fix in the axes of a local world.
 struct GpsPosition {
   TimeNs time_ns = kNoTime;
-  Eigen::Vector3d position = Eigen::Vector3d::Constant(kUnknown);  ///< of the antenna [m]; z is 0 where it is not known
+  Eigen::Vector3d position =
+      Eigen::Vector3d::Constant(kUnknown);  ///< of the antenna [m]; z is that of altitude 0 where it is not known
   Eigen::Matrix3d position_cov = Eigen::Matrix3d::Constant(kUnknown);  ///< [m^2]
   bool has_height = false;
   Eigen::Vector3d velocity = Eigen::Vector3d::Constant(kUnknown);      ///< [m/s]; NaN: not known

@@ -94,6 +94,7 @@ void MapAnchor::reset() {
 }
 
 void MapAnchor::forget_map() {
+  ++map_number_;
   anchored_ = searching_ = false;
   begun_ns_ = kNoTime;
   tried_at_way_ = -1;
@@ -127,12 +128,15 @@ std::uint32_t MapAnchor::take_status() {
 void MapAnchor::move(const Estimate& in_map) {
   if (!has_pose(in_map)) return;
   const bool set_back = last_.time_ns != kNoTime && in_map.time_ns < last_.time_ns;
-  // A camera alone that starts anew has a unit of its own each time.
-  if (set_back || ((in_map.status & kReinitialised) != 0 && !options_.scale_known)) {
+  // A camera alone that starts anew has a unit of its own each time; with an IMU the map begins elsewhere, unless it
+  // was carried over a gap.
+  const bool started = last_.time_ns != kNoTime && (in_map.status & kReinitialised) != 0;
+  if (set_back || (started && (!options_.scale_known || (in_map.status & kGap) == 0))) {
     forget_map();
     if (set_back) before_ns_ = newest_gps_ns_ = last_good_ns_ = kNoTime;
     ++counts_["anchor.map_began_anew"];
   }
+  if (last_.time_ns == kNoTime) forget_foreign_fixes(in_map.time_ns);
   const bool guess = (in_map.status & kPoseIsGuess) != 0;
   const bool found = std::exchange(lost_, guess) && !guess && before_;
   carry(in_map, found);
@@ -142,6 +146,21 @@ void MapAnchor::move(const Estimate& in_map) {
   if (keep) history_.push_back(last_);
   while (to_seconds(last_.time_ns - history_.front().time_ns) > options_.history_s) history_.drop_front();
   take_waiting();
+}
+
+// Fixes that came before the first pose may be of another clock.
+void MapAnchor::forget_foreign_fixes(TimeNs time_ns) {
+  before_ns_ = kNoTime;
+  for (std::size_t n = waiting_.size(); n > 0; --n) {
+    const GpsPosition fix = waiting_.pop_front();
+    TimeNs ahead = 0;
+    if (__builtin_sub_overflow(fix.time_ns, time_ns, &ahead) || to_seconds(ahead) > options_.gps_max_ahead_s) {
+      ++counts_["gps.skipped.ahead"];
+      continue;
+    }
+    before_ns_ = std::max(before_ns_, fix.time_ns);
+    waiting_.push_back(fix);
+  }
 }
 
 // The state follows the way gone in the map. @param found the map has set the pose right: that is no way, the body went
@@ -158,6 +177,7 @@ void MapAnchor::carry(const Estimate& in_map, bool found) {
     last_.velocity_cov = in_map.covariance.block<3, 3>(kV, kV);
   }
   if (before.time_ns == kNoTime) {
+    first_ns_ = in_map.time_ns;
     drifted_at_ = in_map.position;
     return;
   }
@@ -286,6 +306,11 @@ void MapAnchor::fuse(const GpsMeasurement& gps) {
   if (refused(gps_in_world(gps, options_, world, before_ns_, fix))) return;
   if (!world_) world_ = world;
   if (!options_.use_gps_velocity) fix.velocity.setConstant(kUnknown);
+  if (fix.velocity.allFinite() && !is_usable_covariance(fix.velocity_cov)) {
+    fix.velocity.setConstant(kUnknown);
+    ++counts_["gps_velocity.bad_covariance"];
+    status_ |= kBadCovariance;
+  }
   before_ns_ = std::max(before_ns_, gps.time_ns);
   if (waiting_.size() == kMostWaiting) {
     waiting_.drop_front();
@@ -303,6 +328,8 @@ void MapAnchor::take_waiting() {
     const std::optional<Pose> pose = pose_at(fix.time_ns);
     if (pose) {
       take(fix, *pose);
+    } else if (fix.time_ns < first_ns_) {
+      ++counts_["gps.skipped.without_pose"];
     } else {
       ++counts_["gps.too_late"];
       status_ |= kTooLate;
@@ -420,6 +447,7 @@ void MapAnchor::doubt(TimeNs time_ns, const Eigen::Vector3d& residual) {
     const TimeNs since = rejected_since_ns_;
     std::erase_if(pairs_, [&](const AnchorPair& pair) { return pair.fix.time_ns < since; });
     searching_ = true;
+    heading_hint_.reset();
     widened_ = 0;
   }
   covariance_.diagonal().segment<3>(kAnchorPosition).array() += residual.squaredNorm();
@@ -504,7 +532,7 @@ MapAnchor::Jacobian MapAnchor::place_jacobian(const Eigen::Vector3d& way) {
 }
 
 void MapAnchor::put_in_world(SlamFrame& frame) const {
-  if (!anchored_) return;
+  if (!anchored_ || std::isfinite(frame.estimate.origin.latitude)) return;  // it is there already
   frame.estimate = in_world(frame.estimate);
   frame.camera_position = x_.position + to_world(frame.camera_position - last_.position);
   frame.q_world_camera = (x_.q_world_map * frame.q_world_camera).normalized();

@@ -83,6 +83,8 @@ class MapAnchor {
   void reset();
 
   bool anchored() const { return anchored_; }
+  /// Which map it is that poses are of: another number after each new beginning.
+  std::int64_t map_number() const { return map_number_; }
   /// GPS has been there, fix or not.
   bool has_gps() const { return newest_gps_ns_ != kNoTime; }
   const AnchorState& state() const { return x_; }
@@ -126,6 +128,7 @@ class MapAnchor {
   void drift(double way);
   void see_doubt(const Estimate& in_map);
   void find_back();
+  void forget_foreign_fixes(TimeNs time_ns);
   void take_waiting();
   std::optional<Pose> pose_at(TimeNs time_ns) const;
   void take(const GpsPosition& received, const Pose& pose);
@@ -141,6 +144,7 @@ class MapAnchor {
   AnchorState x_;
   Eigen::MatrixXd covariance_;
   bool anchored_ = false;
+  std::int64_t map_number_ = 0;
   bool searching_ = false;     // for another start, because this one was wrong
   TimeNs begun_ns_ = kNoTime;  // fix with which it started
   double tried_at_way_ = -1;
@@ -149,6 +153,7 @@ class MapAnchor {
   double heading_hint_sigma_ = 0;
 
   Pose last_;
+  TimeNs first_ns_ = kNoTime;                             // pose
   double way_ = 0;                                        // gone in the map [unit]
   Eigen::Vector3d drifted_at_ = Eigen::Vector3d::Zero();  // place in the map up to which the drift is counted
   Fifo<Pose> history_;

@@ -349,6 +349,7 @@ void SlamFilter::update_agreeing(const FeaturesMeasurement& frame) {
     // A few may agree by chance, and always do where the prior says nothing.
     for (const int i : which_) landmarks_[static_cast<std::size_t>(i)].state = SlamFeatureState::kRejected;
     candidates_.clear();
+    young_.clear();
     return;
   }
   for (std::size_t k = 0; k < which_.size(); ++k) {

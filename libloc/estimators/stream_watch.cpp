@@ -1,6 +1,7 @@
 #include "libloc/estimators/stream_watch.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "libloc/core/check.hpp"
@@ -11,6 +12,11 @@ namespace {
 constexpr double kFollow = 0.1;  // of an interval, to the usual one
 constexpr double kFarthest =
     5;  // a sample further back is another time line; further ahead, a second one must agree [s]
+
+// a - b, of any times; exact to a microsecond.
+double apart_s(TimeNs a, TimeNs b) {
+  return 1e-9 * (static_cast<double>(a) - static_cast<double>(b));
+}
 
 }  // namespace
 
@@ -43,14 +49,19 @@ void StreamWatch::see(const Measurement& measurement) {
   const Group group = group_of(kind_of(measurement));
   const TimeNs time = stamp_of(measurement).time_ns;
   if (group == kGroups || time == kNoTime) return;
-  if (newest_ns_ != kNoTime && to_seconds(newest_ns_ - time) > kFarthest) reset();
-  if (newest_ns_ != kNoTime && to_seconds(time - newest_ns_) > kFarthest && !std::exchange(far_ahead_, true)) return;
+  if (newest_ns_ != kNoTime) {
+    const double ahead = apart_s(time, newest_ns_);
+    // A receiver whose clock is another one says nothing of the others' time.
+    if (group == kGpsGroup && std::abs(ahead) > kFarthest) return;
+    if (ahead < -kFarthest) reset();
+    if (ahead > kFarthest && !std::exchange(far_ahead_, true)) return;
+  }
   far_ahead_ = false;
   if (first_ns_ == kNoTime) first_ns_ = time;
   newest_ns_ = std::max(newest_ns_, time);
   Stream& stream = streams_[group];
   if (stream.last_ns != kNoTime && time > stream.last_ns) {
-    const double interval = to_seconds(time - stream.last_ns);
+    const double interval = apart_s(time, stream.last_ns);
     // An outage is no interval.
     if (stream.interval_s == 0) {
       stream.interval_s = interval;
@@ -70,7 +81,7 @@ std::uint32_t StreamWatch::status() const {
     const TimeNs since = stream.last_ns != kNoTime ? stream.last_ns : first_ns_;
     if (since == kNoTime) continue;
     const double limit = std::max(limits_[i], intervals_ * stream.interval_s);
-    if (to_seconds(newest_ns_ - since) > limit) status |= kBits[i];
+    if (apart_s(newest_ns_, since) > limit) status |= kBits[i];
   }
   return status;
 }

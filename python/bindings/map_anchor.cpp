@@ -4,8 +4,10 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "arrays.hpp"
@@ -23,12 +25,12 @@ using loc::MapAnchor;
 using loc::MapAnchorOptions;
 
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;  // a few for each fix
+using FixTypes = py::array_t<std::int8_t, py::array::c_style | py::array::forcecast>;
 using Origin = std::tuple<double, double, double>;
 
-std::optional<Origin> origin_of(const MapAnchor& anchor) {
-  if (!anchor.anchored()) return std::nullopt;
-  const loc::GeodeticPoint& o = anchor.world()->origin();
-  return Origin(o.latitude, o.longitude, o.altitude);
+Origin origin_of(const loc::LocalFrame& world) {
+  const loc::GeodeticPoint& o = world.origin();
+  return {o.latitude, o.longitude, o.altitude};
 }
 
 struct AnchoredRun {
@@ -64,8 +66,7 @@ Estimate estimate_of(const SlamRun& run, py::ssize_t i) {
 
 std::vector<GpsMeasurement> fixes_of(const TimeArray& times, const FloatArray& places,
                                      const std::optional<Numbers>& cov, const std::optional<Numbers>& velocity,
-                                     const std::optional<Numbers>& velocity_cov,
-                                     const std::optional<py::array_t<std::int8_t>>& fix) {
+                                     const std::optional<Numbers>& velocity_cov, const std::optional<FixTypes>& fix) {
   const auto time = times_view(times, "times_ns");
   const auto n = static_cast<py::ssize_t>(time.size());
   const Rows<3> place = rows_view<3>(places, "latitude_longitude_altitude", n, "times_ns");
@@ -87,7 +88,15 @@ std::vector<GpsMeasurement> fixes_of(const TimeArray& times, const FloatArray& p
     GpsMeasurement& gps = out[i];
     gps.time_ns = time[i];
     gps.sequence = static_cast<std::int64_t>(i);
-    gps.fix = fix ? static_cast<loc::GpsFixType>(fix->data()[i]) : loc::GpsFixType::k3d;
+    if (fix) {
+      const int type = fix->data()[i];
+      if (type < 0 || type > static_cast<int>(loc::GpsFixType::kFixed)) {
+        throw py::value_error("fix[" + std::to_string(i) + "] = " + std::to_string(type) + ": there is no such type");
+      }
+      gps.fix = static_cast<loc::GpsFixType>(type);
+    } else {
+      gps.fix = loc::GpsFixType::k3d;
+    }
     const auto row = static_cast<Eigen::Index>(i);
     gps.latitude = place(row, 0);
     gps.longitude = place(row, 1);
@@ -96,6 +105,9 @@ std::vector<GpsMeasurement> fixes_of(const TimeArray& times, const FloatArray& p
     if (velocities != nullptr) gps.velocity_enu = Eigen::Map<const Eigen::Vector3d>(velocities + 3 * i);
     if (velocity_covs != nullptr) gps.velocity_cov = Eigen::Map<const Eigen::Matrix3d>(velocity_covs + 9 * i);
   }
+  // A recording has them in the order of arrival.
+  std::stable_sort(out.begin(), out.end(),
+                   [](const GpsMeasurement& a, const GpsMeasurement& b) { return a.time_ns < b.time_ns; });
   return out;
 }
 
@@ -105,22 +117,23 @@ AnchoredRun anchor_run(const SlamRun& run, const std::vector<GpsMeasurement>& fi
   std::vector<Estimate> rows;
   rows.reserve(static_cast<std::size_t>(n));
   std::size_t next = 0;
-  std::size_t held = 0;  // rows from before the map was tied to the Earth
+  std::size_t first_of_map = 0;  // row of the map that is being tied to the Earth
+  std::int64_t map = anchor.map_number();
+  bool tied = false;
   for (py::ssize_t i = 0; i < n; ++i) {
     const Estimate in_map = estimate_of(run, i);
     for (; next < fixes.size() && fixes[next].time_ns <= in_map.time_ns; ++next) anchor.fuse(fixes[next]);
     anchor.move(in_map);
     rows.push_back(anchor.in_world(in_map));
     rows.back().status |= anchor.take_status();
-    if (!anchor.anchored()) {
-      held = rows.size();
-    } else if (held > 0) {
-      for (std::size_t k = 0; k < held; ++k) {
-        if (std::isfinite(rows[k].origin.latitude)) continue;
-        rows[k] = anchor.in_world(rows[k]);
-      }
-      held = 0;
+    if (anchor.map_number() != map) {
+      map = anchor.map_number();
+      first_of_map = rows.size() - 1;
+      tied = false;
     }
+    if (!anchor.anchored() || std::exchange(tied, true)) continue;
+    // What came before in the same map is on the Earth now, too.
+    for (std::size_t k = first_of_map; k + 1 < rows.size(); ++k) rows[k] = anchor.in_world(rows[k]);
   }
   AnchoredRun out;
   const bool with_covariance = n > 0 && rows.front().covariance_dim > 0;
@@ -146,7 +159,9 @@ AnchoredRun anchor_run(const SlamRun& run, const std::vector<GpsMeasurement>& fi
       Eigen::Map<Eigen::MatrixXd>(out.covariance.mutable_data(i, 0, 0), d, d) = e.covariance.topLeftCorner(d, d);
     }
   }
-  out.origin = origin_of(anchor);
+  const bool any =
+      std::any_of(rows.begin(), rows.end(), [](const Estimate& e) { return std::isfinite(e.origin.latitude); });
+  if (any) out.origin = origin_of(*anchor.world());
   out.scale = anchor.anchored() ? anchor.state().scale : loc::kUnknown;
   out.counts = as_map(anchor.counts());
   return out;
@@ -164,6 +179,7 @@ void bind_options(py::module_& m) {
           return options;
         }),
         py::arg("inertial") = true, "TypeError for an unknown field; ValueError for a value out of range.")
+      .def("__copy__", [](const O& o) { return O(o); })
       .def_readwrite("scale_known", &O::scale_known, "The map is in metres; otherwise scale and tilt are found, too.")
       .def_readwrite("scale_sigma", &O::scale_sigma, "of a scale that is known, relative")
       .def_readwrite("tilt_sigma", &O::tilt_sigma, "of the map's z against the vertical [rad]")
@@ -223,7 +239,7 @@ void bind_map_anchor(py::module_& m) {
       "anchor_run",
       [](const SlamRun& run, const TimeArray& times, const FloatArray& places, const MapAnchorOptions& options,
          const std::optional<Numbers>& cov, const std::optional<Numbers>& velocity,
-         const std::optional<Numbers>& velocity_cov, const std::optional<py::array_t<std::int8_t>>& fix) {
+         const std::optional<Numbers>& velocity_cov, const std::optional<FixTypes>& fix) {
         return anchor_run(run, fixes_of(times, places, cov, velocity, velocity_cov, fix), options);
       },
       py::arg("run"), py::arg("gps_times_ns"), py::arg("latitude_longitude_altitude"), py::arg("options"),

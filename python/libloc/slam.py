@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
@@ -155,8 +156,7 @@ def anchor_slam(
 
     rig: lever arm of the antenna and offset of its clock (t_imu = t_gps + offset).
     """
-    if options is None:
-        options = MapAnchorOptions(inertial)
+    options = MapAnchorOptions(inertial) if options is None else copy.copy(options)
     times_ns = gps.times_ns
     if rig is not None and rig.gps is not None:
         options.gps_antenna = rig.gps.antenna_in_body

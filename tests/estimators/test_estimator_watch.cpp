@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "libloc/estimators/attitude_check.hpp"
 #include "libloc/estimators/stream_watch.hpp"
@@ -62,6 +63,17 @@ TEST(StreamWatch, ASlowStreamIsNotAnOutageAndOneAbsurdTimeIsNothing) {
   EXPECT_EQ(watch.newest_ns(), from_seconds(11.4));
   for (int i = 115; i < 140; ++i) watch.see(at<ImuMeasurement>(0.1 * i));
   EXPECT_EQ(watch.status(), kNoImages);
+  // A receiver on another clock says nothing, ahead or behind, however far.
+  const std::uint32_t before = watch.status();
+  for (const TimeNs time :
+       {from_seconds(-20), std::numeric_limits<TimeNs>::max(), std::numeric_limits<TimeNs>::min() + 1}) {
+    GpsMeasurement gps;
+    gps.time_ns = time;
+    watch.see(gps);
+    watch.see(gps);
+    EXPECT_EQ(watch.status(), before);
+    EXPECT_EQ(watch.newest_ns(), from_seconds(13.9));
+  }
   // The clock was set back: another time line.
   watch.see(at<ImuMeasurement>(1));
   EXPECT_EQ(watch.status(), 0U);
@@ -71,6 +83,7 @@ TEST(StreamWatch, ASlowStreamIsNotAnOutageAndOneAbsurdTimeIsNothing) {
 struct Turning {
   AttitudeCheck check;
   double t = 0;
+  double held_s = 0;  // an estimate is so much older than the newest sample
 
   static Eigen::Quaterniond truth(double t) {
     return so3::exp({0, 0, 0.3 * t}) * so3::exp({0.4 * std::sin(0.5 * t), 0.3 * std::sin(0.3 * t), 0});
@@ -92,7 +105,10 @@ struct Turning {
       imu.angular_velocity = so3::log(truth(t - kH).inverse() * truth(t + kH)) / (2 * kH);
       imu.specific_force = truth(t).inverse() * (Eigen::Vector3d(0, 0, 9.81) + acceleration);
       check.see(imu);
-      status = check.compare(estimate(q_world_est, sigma));
+      Estimate e = estimate(q_world_est, sigma);
+      if (held_s > 0) e.q_world_body = q_world_est * truth(t - held_s);
+      e.time_ns = from_seconds(t - held_s);
+      status = check.compare(e);
     }
     return status;
   }
@@ -114,6 +130,10 @@ TEST(AttitudeCheck, SeesAWrongVerticalAndOnlyThat) {
   EXPECT_EQ(Turning().run(30, so3::exp({0.05, 0, 0}), 0.01), 0U);  // 3 degrees
   EXPECT_EQ(Turning().run(30, so3::exp({0.2, 0, 0}), 0.01), kTiltDoubtful);
   EXPECT_EQ(Turning().run(30, so3::exp({0.2, 0, 0}), 0.1), 0U);  // it knows that it does not know
+  Turning held;                                                  // as with a camera whose clock is ahead
+  held.held_s = 0.05;
+  EXPECT_EQ(held.run(30, so3::exp({0.2, 0, 0}), 0.01), kTiltDoubtful);
+  EXPECT_EQ(held.run(30, Eigen::Quaterniond::Identity(), 0.01), 0U);
   // Braking for two seconds is not a wrong vertical, and one that was wrong and was mended is right.
   Turning turning;
   EXPECT_EQ(turning.run(20, Eigen::Quaterniond::Identity(), 0.01), 0U);

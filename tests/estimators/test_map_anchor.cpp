@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -437,6 +438,49 @@ TEST(MapAnchor, LostAndFoundAgain) {
   }
 }
 
+// A fix of another clock before the first pose must not spoil those that follow.
+TEST(MapAnchor, FixesBeforeTheFirstPoseMayBeOfAnotherClock) {
+  MapAnchor anchor(white(true));
+  Ride ride;
+  Random random(1);
+  for (const double t : {1e6, 0.01}) {
+    GpsMeasurement gps = fix_at(0, ride, random);
+    gps.time_ns = from_seconds(t);
+    anchor.fuse(gps);
+  }
+  Drift drift(ride, white(true), 1);
+  for (int i = 0; i < 5; ++i) anchor.move(drift.pose(0.02 * i, truth_at(0.02 * i)));
+  EXPECT_EQ(count(anchor.counts(), "gps.skipped.ahead"), 1);
+  EXPECT_EQ(count(anchor.counts(), "gps.too_late"), 0);
+}
+
+// The map of an IMU that begins elsewhere is not a way that the body went.
+TEST(MapAnchor, AMapThatBeginsElsewhereIsFoundAnew) {
+  Ride ride;
+  double worst = 0;
+  bool anew = false;
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+  ride.spoil_pose = [&](double t, Estimate& pose) {
+    if (t < 30) return;
+    if (!anew) {
+      anew = true;
+      shift = -pose.position;
+      pose.status |= kReinitialised;
+    }
+    pose.position += shift;
+  };
+  ride.see = [&](double t, const Estimate& e, const Truth& x) {
+    if (std::isfinite(e.origin.latitude) && t > 15) worst = std::max(worst, position_error(e, x));
+    if (t > 59) {
+      EXPECT_TRUE(std::isfinite(e.origin.latitude));
+    }
+  };
+  const MapAnchor anchor = run(ride, white(true), 13);
+  EXPECT_LT(worst, 3);
+  EXPECT_EQ(count(anchor.counts(), "anchor.started"), 2);
+  EXPECT_GT(anchor.map_number(), 0);
+}
+
 TEST(MapAnchor, BadFixesAreCountedAndLeaveAllAsItWas) {
   Ride ride;
   const auto spoiled = [&](const std::function<void(GpsMeasurement&)>& spoil, const std::string& name,
@@ -464,7 +508,10 @@ TEST(MapAnchor, BadFixesAreCountedAndLeaveAllAsItWas) {
   spoiled([](GpsMeasurement& gps) { gps.latitude = 2; }, "gps.skipped.out_of_range", kOutOfRange);
   spoiled([](GpsMeasurement& gps) { gps.position_cov(1, 1) = -1; }, "gps.bad_covariance", kBadCovariance);
   spoiled([](GpsMeasurement& gps) { gps.time_ns += from_seconds(100); }, "gps.skipped.ahead", kOutOfRange);
-  spoiled([](GpsMeasurement& gps) { gps.time_ns -= from_seconds(100); }, "gps.too_late", kTooLate);
+  spoiled([](GpsMeasurement& gps) { gps.time_ns -= from_seconds(5); }, "gps.too_late", kTooLate);
+  spoiled([](GpsMeasurement& gps) { gps.velocity_cov.setConstant(std::numeric_limits<double>::infinity()); },
+          "gps_velocity.bad_covariance", kBadCovariance);
+  spoiled([](GpsMeasurement& gps) { gps.altitude = 1e20; }, "gps.skipped.out_of_range", kOutOfRange);
   MapAnchorOptions wrong = white(true);
   wrong.gate_probability = 1;
   EXPECT_THROW(MapAnchor{wrong}, std::invalid_argument);

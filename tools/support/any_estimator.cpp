@@ -223,8 +223,9 @@ Estimate AnyEstimator::estimate() const {
 
 std::uint32_t AnyEstimator::status() const {
   constexpr std::uint32_t kOfStreams = kNoImages | kNoImu;
-  // Of streams the newest measurement tells, of the rest the last estimate.
-  return (estimate_.status & ~kOfStreams) | watch_.status();
+  // Of streams the newest measurement tells, of the rest the last estimate; an event happens once.
+  const std::uint32_t events = gave_estimate_ ? 0U : kRefound;
+  return (estimate_.status & ~(kOfStreams | events)) | watch_.status();
 }
 
 NamedCounts AnyEstimator::counts() const {

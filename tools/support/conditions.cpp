@@ -11,7 +11,7 @@ namespace loc {
 namespace {
 
 constexpr TimeNs kOver = 500'000'000;  // not said for so long
-constexpr TimeNs kSetBack = 5'000'000'000;
+constexpr double kSetBack = 5e9;       // [ns]
 
 }  // namespace
 
@@ -33,7 +33,7 @@ const std::array<Condition, Conditions::kConditions>& Conditions::known() {
 
 void Conditions::update(TimeNs time_ns, std::uint32_t status) {
   if (time_ns == kNoTime) return;
-  if (now_ns_ != kNoTime && time_ns < now_ns_ - kSetBack) {
+  if (now_ns_ != kNoTime && static_cast<double>(now_ns_) - static_cast<double>(time_ns) > kSetBack) {
     for (Track& track : tracks_) track.since_ns = track.seen_ns = kNoTime;
     held_.clear();
     changed_ = true;

@@ -15,7 +15,7 @@ namespace loc {
 class HeldBackOutput : public EstimateOutput {
  public:
   /// @param anchor asked for when an estimate on the Earth comes
-  /// @param most estimates that are held; what is older goes out as it is in the map, which is said aloud
+  /// @param most estimates and frames that are held; what is older goes out as it is in the map, which is said aloud
   HeldBackOutput(std::unique_ptr<EstimateOutput> to, std::function<const MapAnchor*()> anchor, std::size_t most);
 
   void write(const Estimate& estimate) override;
@@ -24,10 +24,13 @@ class HeldBackOutput : public EstimateOutput {
   void finish() override;
 
  private:
-  using Held = std::variant<Estimate, SlamFrame>;
+  struct Held {
+    std::variant<Estimate, SlamFrame> what;
+    std::int64_t map = 0;  // which one it is of
+  };
   void put(const Held& held);
-  void release(const MapAnchor* anchor);
-  void hold(Held held);
+  void release();
+  void hold(std::variant<Estimate, SlamFrame> what);
 
   std::unique_ptr<EstimateOutput> to_;
   std::function<const MapAnchor*()> anchor_;

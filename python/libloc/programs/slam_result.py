@@ -154,10 +154,11 @@ def _mean_square(values: NDArray[np.float64]) -> float | None:
 
 
 def _world_sigma(world: libloc.AnchoredRun) -> float | None:
-    """Of the last position, horizontal [m]."""
-    if len(world.covariance) == 0:
+    """Of the last position on the Earth, horizontal [m]."""
+    rows = np.flatnonzero(world.georeferenced)
+    if len(world.covariance) == 0 or len(rows) == 0:
         return None
-    return float(np.sqrt(np.trace(world.covariance[-1][3:5, 3:5])))
+    return float(np.sqrt(np.trace(world.covariance[rows[-1]][3:5, 3:5])))
 
 
 def report(result: SlamResult) -> dict[str, Any]:

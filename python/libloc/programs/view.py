@@ -55,6 +55,8 @@ from libloc.view.target import Interrupt, Target, ViewerPlan
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"
+_RESULTS = ("estimate", "frame", "map")  # what an estimator makes
+_END_S = 1.5  # without any of these, after the source has ended
 _SILENCE_S = 10.0  # after which it says that nothing comes
 _AXIS_M = 0.3  # live, until there is a map to tell
 
@@ -257,18 +259,22 @@ def _show_live(rr: Any, options: argparse.Namespace, camera: Any | None, interru
         layout = Layout(follow=True, window_s=options.window, in_frustum=camera is not None)
         target.stream.send_blueprint(blueprint(rr, layout))
         drawing = LiveDrawing(scene, intake, options.align)
-        began = heard = time.monotonic()
+        began = heard = result_came = time.monotonic()
         target.keep_part = True
         _say(f"listening on {options.lcm_url}, Ctrl-C ends it")
         while not interrupt.asked and (target.viewer is None or target.viewer.running):
             now = time.monotonic()
-            if now - began > options.duration or (options.exit_at_end and drawing.ended):
+            # The source may have ended while the estimator still works on what it has.
+            at_end = options.exit_at_end and drawing.ended and now - result_came > _END_S
+            if now - began > options.duration or at_end:
                 break
             for channel, data in receiver.take(0.02):
                 item = intake.take(channel, data)
                 if item is None:
                     continue
                 heard = now
+                if item.stream in _RESULTS:
+                    result_came = now
                 drawing.take(item, now)
                 if _learn(layout, scene, item):
                     target.stream.send_blueprint(blueprint(rr, layout))

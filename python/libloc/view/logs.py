@@ -17,6 +17,7 @@ from libloc.view.geometry import Floats
 from libloc.view.intake import Intake, Item
 from libloc.view.pictures import Features, Frames
 from libloc.view.scene import Scene
+from libloc.view.space import is_tied
 
 _EXTENT = 0.95  # share of the points that the view is made for
 _FEWEST = 3  # pairs for an alignment
@@ -114,7 +115,7 @@ def _look(out: Survey, item: Item, camera: int) -> None:
             out.has_latency |= m.host_time_ns != NO_TIME and m.publish_time_ns > m.host_time_ns
             out.scale_unknown |= bool(m.status & EstimateStatus.SCALE_UNKNOWN)
             if m.valid & EstimateValid.POSITION and np.isfinite(m.position).all():
-                tied = bool(m.valid & EstimateValid.HEADING)
+                tied = is_tied(m)
                 if tied and not out.tied and out.positions:
                     out.became_tied = True
                     out.times_ns.clear()

@@ -54,7 +54,10 @@ def has_display() -> bool:
 
 def _quiet() -> None:
     command = [*rerun_command(), "analytics", "disable"]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        subprocess.run(command, check=True, capture_output=True, text=True)
+    except subprocess.CalledProcessError as error:
+        raise ViewerError(f"rerun does not start: {error.stderr.strip()}") from None
 
 
 def check_screenshots() -> None:
@@ -163,7 +166,11 @@ class Viewer:
             # Ctrl-C is for this program, which ends the viewer when it has sent all.
             start_new_session=True,
         )
-        self._wait()
+        try:
+            self._wait()
+        except BaseException:
+            self.close()
+            raise
 
     @property
     def data_url(self) -> str:

@@ -132,7 +132,7 @@ class SpaceDrawing:
         out.log(t, "world/body", rr.Transform3D(translation=place, **turn))
         self.counts["estimates.drawn"] += 1
         if placed:
-            self._tie(t, bool(m.valid & EstimateValid.HEADING))
+            self._tie(t, is_tied(m))
             self._trail.add(out, t, p)
             self._low, self._high = np.minimum(self._low, p), np.maximum(self._high, p)
         if not self.camera_from_frames:
@@ -293,6 +293,11 @@ class SpaceDrawing:
         down = world == "NED"
         coordinates = self.out.rr.ViewCoordinates
         self.out.static("world", coordinates.RIGHT_HAND_Z_DOWN if down else coordinates.RIGHT_HAND_Z_UP)
+
+
+def is_tied(estimate: Any) -> bool:
+    """The world of an estimate_t is the one that its log ends in: only SLAM begins in a map of its own."""
+    return bool(estimate.valid & EstimateValid.HEADING) or not estimate.method.endswith("slam")
 
 
 def _colours(share: Floats) -> NDArray[np.uint8]:

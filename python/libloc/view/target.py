@@ -24,7 +24,9 @@ class Interrupt:
 
     def __enter__(self) -> Interrupt:
         self._before = {
-            number: signal.signal(number, self._handle) for number in (signal.SIGINT, signal.SIGTERM)
+            number: signal.signal(number, self._handle)
+            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN  # nohup
         }
         return self
 
@@ -82,10 +84,13 @@ class Target:
                 viewer = output.Viewer(plan.kind, plan.memory, plan.web_port, plan.data_port)
                 self.viewer = stack.enter_context(viewer)
             self.stream = self._rr.RecordingStream("libloc-view")
-            sinks: list[Any] = [] if self._file is None else [self._rr.FileSink(str(self._file))]
-            if self.viewer is not None:
-                sinks.append(self._rr.GrpcSink(self.viewer.data_url))
-            self.stream.set_sinks(*sinks)
+            try:
+                sinks: list[Any] = [] if self._file is None else [self._rr.FileSink(str(self._file))]
+                if self.viewer is not None:
+                    sinks.append(self._rr.GrpcSink(self.viewer.data_url))
+                self.stream.set_sinks(*sinks)
+            except RuntimeError as error:
+                raise output.ViewerError(f"{self._file or 'the viewer'}: {error}") from None
             stack.callback(self.stream.disconnect)  # before the viewer ends
             self._stack = stack.pop_all()
         return self
@@ -121,7 +126,10 @@ class Target:
         try:
             self.stream.flush(timeout_sec=timeout_s)
         except (RuntimeError, ValueError, OSError) as error:
-            if patient and "shut down" not in str(error):
+            disk = "shut down" in str(error)
+            # A window that was closed takes nothing any more; the file is whole all the same.
+            closed = self.viewer is not None and not self.viewer.running
+            if not disk and (patient or closed):
                 return
             where = f"{self._file}" if self._file is not None else "the viewer"
             raise output.ViewerError(
