@@ -108,6 +108,9 @@ loc::EstimatorSettings settings_of(const Arguments& arguments, const loc::Rig& r
   if (loc::is_slam(arguments.method)) {
     loc::SlamOptions usual;
     usual.motion = loc::slam_motion(arguments.method);
+    // What is usual for pictures depends on their size.
+    const auto camera = static_cast<std::size_t>(arguments.slam.camera);
+    if (camera < rig.cameras.size()) usual.camera = rig.cameras[camera];
     if (arguments.slam.images) usual = options_for_images(usual);
     settings.slam = loc::slam_options(arguments.slam, arguments.method, rig, usual);
     settings.slam_start = loc::slam_start(arguments.slam, settings.slam);

@@ -26,6 +26,7 @@ FINGERPRINTS = {
     "slam_frame_t": 0x494BFFF77A74F59A,
     "slam_state_t": 0x179AA043B2BA5005,
     "source_status_t": 0xD63AB9362BC56F14,
+    "estimator_status_t": 0xFE8191C6F75D653B,
     "statistics_t": 0x2F2B80D43DC8BFD9,
     "tracks_t": 0x950A197598A1B7D6,
 }

@@ -1327,6 +1327,7 @@ class EstimateStatus(enum.IntFlag):
     REFOUND: typing.ClassVar[EstimateStatus]
     REINITIALISED: typing.ClassVar[EstimateStatus]
     SCALE_UNKNOWN: typing.ClassVar[EstimateStatus]
+    STAMPS_DOUBTFUL: typing.ClassVar[EstimateStatus]
     TILT_DOUBTFUL: typing.ClassVar[EstimateStatus]
     TIME_NOT_INCREASING: typing.ClassVar[EstimateStatus]
     TOO_LATE: typing.ClassVar[EstimateStatus]
@@ -4608,6 +4609,14 @@ class SlamMapOptions:
     def border_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def cover_radius_px(self) -> float:
+        """
+        Nothing joins the map so near to features that are expected but hidden, and they stay in it for a while. 0: off [px].
+        """
+    @cover_radius_px.setter
+    def cover_radius_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def delete_after_tries(self) -> int:
         """
         Frames in which a feature was expected, before it is judged.
@@ -4710,6 +4719,14 @@ class SlamMapOptions:
         """
     @sigma_inverse_depth.setter
     def sigma_inverse_depth(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def steer_after_frames(self) -> int:
+        """
+        While something hides many features at once, younger ones than that are estimated but move nothing else. 0: off.
+        """
+    @steer_after_frames.setter
+    def steer_after_frames(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
 class SlamAssociationOptions:
     """
@@ -5279,7 +5296,7 @@ class SlamOptions:
     @property
     def lost_after_s(self) -> float:
         """
-        Without a frame of enough features: estimates say so (FEW_FEATURES) [s].
+        Without a frame that is found in the map: estimates say so (LOST; with an IMU FEW_FEATURES, too) [s].
         """
     @lost_after_s.setter
     def lost_after_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -5387,6 +5404,14 @@ class SlamOptions:
         """
     @recover_after.setter
     def recover_after(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def relocate_s(self) -> float:
+        """
+        For so long of frames that show something, but not the map, nothing is added to it: for front ends that look for it. 0: the next frame is one of new surroundings [s].
+        """
+    @relocate_s.setter
+    def relocate_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def second_order_noise(self) -> bool:
@@ -6174,6 +6199,8 @@ class MapAnchorOptions:
     How GPS ties a map to the Earth. MapAnchorOptions(inertial=True) is for real receivers and a map in metres; every field is a keyword of the constructor.
     """
     use_gps_velocity: bool
+    def __copy__(self) -> MapAnchorOptions:
+        ...
     def __init__(self, inertial: bool = True, **kwargs) -> None:
         """
         TypeError for an unknown field; ValueError for a value out of range.
