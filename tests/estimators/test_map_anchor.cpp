@@ -448,7 +448,8 @@ TEST(MapAnchor, FixesBeforeTheFirstPoseMayBeOfAnotherClock) {
     gps.time_ns = from_seconds(t);
     anchor.fuse(gps);
   }
-  Drift drift(ride, white(true), 1);
+  const MapAnchorOptions options = white(true);
+  Drift drift(ride, options, 1);
   for (int i = 0; i < 5; ++i) anchor.move(drift.pose(0.02 * i, truth_at(0.02 * i)));
   EXPECT_EQ(count(anchor.counts(), "gps.skipped.ahead"), 1);
   EXPECT_EQ(count(anchor.counts(), "gps.too_late"), 0);

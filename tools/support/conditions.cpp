@@ -10,10 +10,14 @@
 namespace loc {
 namespace {
 
-constexpr TimeNs kOver = 500'000'000;  // not said for so long
-constexpr double kSetBack = 5e9;       // [ns]
+constexpr double kOver = 0.5;   // not said for so long [s]
+constexpr double kSetBack = 5;  // [s]
 
 }  // namespace
+
+double apart_s(TimeNs a, TimeNs b) {
+  return 1e-9 * (static_cast<double>(a) - static_cast<double>(b));
+}
 
 const std::array<Condition, Conditions::kConditions>& Conditions::known() {
   static constexpr std::array<Condition, kConditions> kAll = {{{kNoImages, "no images"},
@@ -33,7 +37,7 @@ const std::array<Condition, Conditions::kConditions>& Conditions::known() {
 
 void Conditions::update(TimeNs time_ns, std::uint32_t status) {
   if (time_ns == kNoTime) return;
-  if (now_ns_ != kNoTime && static_cast<double>(now_ns_) - static_cast<double>(time_ns) > kSetBack) {
+  if (now_ns_ != kNoTime && apart_s(now_ns_, time_ns) > kSetBack) {
     for (Track& track : tracks_) track.since_ns = track.seen_ns = kNoTime;
     held_.clear();
     changed_ = true;
@@ -52,9 +56,9 @@ void Conditions::update(TimeNs time_ns, std::uint32_t status) {
       ++track.times;
       changed = true;
       log_warning("event=degraded condition=\"{}\" time={}", condition.name, format_seconds(now_ns_));
-    } else if (track.since_ns != kNoTime && now_ns_ - track.seen_ns > kOver) {
+    } else if (track.since_ns != kNoTime && apart_s(now_ns_, track.seen_ns) > kOver) {
       log_info("event=restored condition=\"{}\" time={} after_s={:.3f}", condition.name, format_seconds(now_ns_),
-               to_seconds(track.seen_ns - track.since_ns));
+               apart_s(track.seen_ns, track.since_ns));
       track.since_ns = kNoTime;
       changed = true;
     }

@@ -11,6 +11,9 @@
 
 namespace loc {
 
+/// a - b [s], of any times; exact to a microsecond.
+double apart_s(TimeNs a, TimeNs b);
+
 struct Condition {
   std::uint32_t bit;  ///< EstimateStatus
   const char* name;

@@ -228,7 +228,7 @@ void LiveEstimator::publish_status() {
   message.georeferenced = pipeline_.estimator().georeferenced() ? 1 : 0;
   for (const Conditions::Held& held : conditions.held()) {
     message.condition.emplace_back(held.condition.name);
-    message.since_s.push_back(to_seconds(conditions.now_ns() - held.since_ns));
+    message.since_s.push_back(apart_s(conditions.now_ns(), held.since_ns));
   }
   if (conditions.silent()) {
     message.condition.emplace_back("no measurements");
