@@ -4,8 +4,10 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <stdexcept>
 
 #include "libloc/core/check.hpp"
+#include "libloc/estimators/estimate.hpp"
 
 namespace loc {
 namespace {
@@ -59,6 +61,24 @@ bool is_usable_covariance(const Eigen::Matrix3d& cov) {
   return cov.allFinite() && cov.cwiseAbs().maxCoeff() < kMostVariance &&
          (cov - cov.transpose()).isZero(1e-6 * cov.norm()) && cov.diagonal().minCoeff() > 0 &&
          cov.llt().info() == Eigen::Success;
+}
+
+GpsRefusalNote note_of(GpsRefusal refusal) {
+  switch (refusal) {
+    case GpsRefusal::kNoFix:
+      return {"gps.skipped.no_fix", 0};
+    case GpsRefusal::kNotFinite:
+      return {"gps.skipped.not_finite", kNotFinite};
+    case GpsRefusal::kOutOfRange:
+      return {"gps.skipped.out_of_range", kOutOfRange};
+    case GpsRefusal::kBadCovariance:
+      return {"gps.bad_covariance", kBadCovariance};
+    case GpsRefusal::kRepeated:
+      return {"gps.skipped.repeated", 0};
+    case GpsRefusal::kNone:
+      break;
+  }
+  throw std::invalid_argument("refusal: there is none");
 }
 
 GpsRefusal gps_place(const GpsMeasurement& gps, GeodeticPoint& place) {

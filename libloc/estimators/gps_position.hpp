@@ -39,6 +39,13 @@ struct GpsErrorModel {
 /// Why a fix is of no use.
 enum class GpsRefusal : std::uint8_t { kNone, kNoFix, kNotFinite, kOutOfRange, kBadCovariance, kRepeated };
 
+/// How a refusal is counted and told. kNone is no refusal: @throws std::invalid_argument.
+struct GpsRefusalNote {
+  const char* count;
+  std::uint32_t status;  ///< EstimateStatus
+};
+GpsRefusalNote note_of(GpsRefusal refusal);
+
 /// A fix in the axes of a local world.
 struct GpsPosition {
   TimeNs time_ns = kNoTime;

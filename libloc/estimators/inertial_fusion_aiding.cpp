@@ -33,25 +33,9 @@ void InertialFusion::process_other(const Measurement& measurement) {
 }
 
 bool InertialFusion::refused(GpsRefusal refusal) {
-  switch (refusal) {
-    case GpsRefusal::kNone:
-      return false;
-    case GpsRefusal::kNoFix:
-      ++counts_["gps.skipped.no_fix"];
-      return true;
-    case GpsRefusal::kNotFinite:
-      skip("gps.skipped.not_finite", kNotFinite);
-      return true;
-    case GpsRefusal::kOutOfRange:
-      skip("gps.skipped.out_of_range", kOutOfRange);
-      return true;
-    case GpsRefusal::kBadCovariance:
-      skip("gps.bad_covariance", kBadCovariance);
-      return true;
-    case GpsRefusal::kRepeated:
-      ++counts_["gps.skipped.repeated"];
-      return true;
-  }
+  if (refusal == GpsRefusal::kNone) return false;
+  const GpsRefusalNote note = note_of(refusal);
+  skip(note.count, note.status);
   return true;
 }
 

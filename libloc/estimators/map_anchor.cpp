@@ -264,28 +264,10 @@ void MapAnchor::find_back() {
 }
 
 bool MapAnchor::refused(GpsRefusal refusal) {
-  switch (refusal) {
-    case GpsRefusal::kNone:
-      return false;
-    case GpsRefusal::kNoFix:
-      ++counts_["gps.skipped.no_fix"];
-      return true;
-    case GpsRefusal::kNotFinite:
-      ++counts_["gps.skipped.not_finite"];
-      status_ |= kNotFinite;
-      return true;
-    case GpsRefusal::kOutOfRange:
-      ++counts_["gps.skipped.out_of_range"];
-      status_ |= kOutOfRange;
-      return true;
-    case GpsRefusal::kBadCovariance:
-      ++counts_["gps.bad_covariance"];
-      status_ |= kBadCovariance;
-      return true;
-    case GpsRefusal::kRepeated:
-      ++counts_["gps.skipped.repeated"];
-      return true;
-  }
+  if (refusal == GpsRefusal::kNone) return false;
+  const GpsRefusalNote note = note_of(refusal);
+  ++counts_[note.count];
+  status_ |= note.status;
   return true;
 }
 
