@@ -551,5 +551,22 @@ TEST(MapAnchor, FramesAndPointsComeToTheSamePlaceAsThePose) {
   EXPECT_GT(point_in_world.position_cov(0, 0), anchor.covariance()(0, 0));
 }
 
+// The deviation of the heading is the anchor's, not that of the pose in its map beside it.
+TEST(MapAnchor, TheHeadingsDeviationIsThatAgainstNorth) {
+  const MapAnchor anchor = run(Ride(), white(true), 14);
+  Estimate pose;
+  pose.valid = kValidOrientation | kValidPosition | kValidVelocity | kValidCovariance;
+  pose.q_world_body = so3::exp({0.3, -0.2, 0.5});
+  pose.position = {1, 2, 3};
+  pose.velocity = {1, 0, 0};
+  pose.covariance_dim = kMaxEstimateDim;
+  pose.covariance = 0.04 * Eigen::Matrix<double, kMaxEstimateDim, kMaxEstimateDim>::Identity();
+  const Estimate e = anchor.in_world(pose);
+  const Eigen::Vector3d up = e.q_world_body.inverse() * Eigen::Vector3d::UnitZ();
+  const Eigen::Matrix3d cov = e.covariance.topLeftCorner<3, 3>();
+  EXPECT_NEAR(up.dot(cov * up), anchor.covariance()(kAnchorTurn + 2, kAnchorTurn + 2), 1e-9);
+  EXPECT_NEAR(cov.trace() - up.dot(cov * up), 0.08, 1e-6);  // the tilt is the map's
+}
+
 }  // namespace
 }  // namespace loc
