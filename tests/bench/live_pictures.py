@@ -12,7 +12,7 @@ loc-estimator --method inertial-slam --images, lcm-logger, --view COMMAND with t
 the driver at the pace of the stamps.
 
 Printed: pictures and IMU samples sent, used and dropped; latency from the arrival of a picture to its pose in
-the log; CPU time and memory (resident, at a sixth of the run and at its end) of each program; load.
+the log; CPU time and memory (resident, after each sixth of the run) of each program; load.
 Of the first 5 s the latency is printed apart: pictures wait until the start is found.
 Judged: nothing dropped, p99 <= 33 ms, the estimator's memory grows by less than 5 % after the first sixth.
 Exit code 1 when something of that is missed or a program failed.
@@ -104,9 +104,9 @@ class Process:
             stderr=log.open("w"),
             env=os.environ | environment,
         )
-        self.cpu_s, self.memory_kb, self.memory_early_kb = 0.0, 0, None
+        self.cpu_s, self.memory_kb, self.memory_each_kb = 0.0, 0, []
 
-    def look(self, early):
+    def look(self, note):
         try:
             stat = Path(f"/proc/{self.process.pid}/stat").read_text().rsplit(")", 1)[1].split()
             memory = re.search(r"VmRSS:\s+(\d+)", Path(f"/proc/{self.process.pid}/status").read_text())
@@ -116,8 +116,8 @@ class Process:
             return
         self.cpu_s = (int(stat[11]) + int(stat[12])) / os.sysconf("SC_CLK_TCK")
         self.memory_kb = int(memory[1])
-        if early:
-            self.memory_early_kb = self.memory_kb
+        if note:
+            self.memory_each_kb.append(self.memory_kb)
 
     def end(self, number=signal.SIGINT, patience=20):
         if self.process.poll() is None:
@@ -198,13 +198,13 @@ def main() -> int:
             folder / "driver.log",
         )
         started.append(driver)
-        begin, early_done = time.monotonic(), False
+        begin, sixths = time.monotonic(), 0
         while driver.process.poll() is None and time.monotonic() - begin < 2 * seconds + 60:
             time.sleep(0.5)
-            early = not early_done and time.monotonic() - begin > seconds / 6
-            early_done |= early
+            note = time.monotonic() - begin > (sixths + 1) * seconds / 6
+            sixths += note
             for process in started:
-                process.look(early)
+                process.look(note)
         wall = time.monotonic() - begin
         try:
             code = estimator.process.wait(20)
@@ -247,11 +247,8 @@ def report(started, driver, estimator, code, driver_code, wall, folder, options)
     sent, got = driver.last("ended"), estimator.last("ended")
     print(f"driver: {told(sent)}\nestimator: {told(got)}")
     for process in started:
-        cpu, early = 100 * process.cpu_s / wall, (process.memory_early_kb or 0) / 1024
-        print(
-            f"{process.name:14s} CPU {cpu:5.1f} % of one core, "
-            f"memory {early:.1f} -> {process.memory_kb / 1024:.1f} MB"
-        )
+        memory = " ".join(f"{kb / 1024:.1f}" for kb in [*process.memory_each_kb, process.memory_kb])
+        print(f"{process.name:14s} CPU {100 * process.cpu_s / wall:5.1f} % of one core, memory {memory} MB")
     size = (folder / "live.lcm").stat().st_size / 1e6
     print(f"log {size:.0f} MB, {wall:.0f} s, load of the machine {os.getloadavg()[0]:.1f}")
     missed = []
@@ -285,7 +282,7 @@ def report(started, driver, estimator, code, driver_code, wall, folder, options)
         )
         if p99 > MAX_P99_MS:
             missed.append(f"latency p99 {p99:.1f} ms > {MAX_P99_MS} ms")
-    early, late = estimator.memory_early_kb, estimator.memory_kb
+    early, late = (estimator.memory_each_kb or [0])[0], estimator.memory_kb
     if not early or late > 1.05 * early:
         missed.append(f"memory of loc-estimator: {early} -> {late} kB")
     for text in missed:
