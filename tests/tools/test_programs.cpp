@@ -259,6 +259,27 @@ TEST_F(Programs, SlowClientOfTheHubHarmsNobody) {
   EXPECT_GT(figure(errors("hub"), "event=ended", "dropped"), 0) << errors("hub");
 }
 
+TEST_F(Programs, DriverThatHasWaitedForTheEstimatorLeavesNoAnswersInTheHub) {
+  write_recording(path("r.csv"), 200, 60);
+  RunningHub hub(folder_, {"--max-queue-bytes", "1000000"});
+  ChildProcess estimator = start_program("loc-estimator", {"--exit-at-end", "--lcm-url", hub.url});
+  ChildProcess driver = start_program(
+      "loc-driver", {"csv", path("r.csv"), "--speed", "30", "--wait-for-estimator", "10", "--lcm-url", hub.url});
+  // More than a queue and the sockets' buffers hold, on a channel that the driver listens to while it waits.
+  LcmPublisher publisher(hub.url);
+  int sent = 0;
+  while (driver.running()) {
+    publisher.publish(kStatisticsChannel, Bytes(100'000));
+    ++sent;
+    ::poll(nullptr, 0, 5);
+  }
+  EXPECT_TRUE(driver.succeeded()) << driver.describe() << errors("loc-driver");
+  EXPECT_GT(sent, 150);
+  ASSERT_TRUE(estimator.wait(10 * kSecond));
+  EXPECT_TRUE(hub.process.stop(2 * kSecond));
+  EXPECT_EQ(figure(errors("hub"), "event=ended", "dropped"), 0) << errors("hub");
+}
+
 TEST_F(Programs, KilledEstimatorAndLoggerAreStartedAnewAndTheLogIsReadable) {
   write_recording(path("r.csv"), 200, 5);
   ChildProcess live =

@@ -56,6 +56,8 @@ Driver::Driver(DriverOptions options, std::unique_ptr<MeasurementSource> source)
 void Driver::run() {
   try {
     if (options_.wait_for_estimator_s) wait_for_estimator();
+    // Answers that nobody reads would pile up in the hub, or over udpm in this process.
+    if (options_.speed > 0) receiver_.reset();
     publish_all();
   } catch (const std::exception& error) {
     publish_status(source_status_t::STATE_FAILED, error.what());
@@ -89,7 +91,13 @@ void Driver::publish_all() {
     }
     if (duration_ns > 0 && time - *begin >= duration_ns) return;
     if (!sleep_for(pacer_.wait_ns(time, steady_now()))) return;
-    if (options_.speed == 0 && kind_of(*measurement) == StreamKind::kImu) wait_for_window();
+    if (options_.speed == 0) {
+      if (kind_of(*measurement) == StreamKind::kImu) {
+        wait_for_window();
+      } else {
+        poll_answers(0);
+      }
+    }
     if (stop_requested()) return;
     publish_measurement(*measurement);
     report_each_second();

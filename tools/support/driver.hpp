@@ -68,7 +68,7 @@ class Driver {
   DriverOptions options_;
   std::unique_ptr<MeasurementSource> source_;
   LcmPublisher publisher_;
-  std::optional<LcmReceiver> receiver_;
+  std::optional<LcmReceiver> receiver_;  // while answers matter
   Pacer pacer_;
   FlowControl flow_;
   std::map<std::pair<StreamKind, int>, std::int64_t> next_sequence_;
