@@ -215,6 +215,10 @@ std::optional<double> better_spacing(const CalibrationTarget& target, const Prob
   return cost(best) < 0.5 * cost(given) ? std::optional(std::exp(best)) : std::nullopt;
 }
 
+// Pictures that follow each other hang together as well: the same blur, the same part of the lens. With more groups
+// they would not be long enough, with fewer their scatter says little about eight parameters.
+constexpr std::size_t kGroupsForScatter = 16;
+
 void find_covariance(const Problem& problem, CameraFit& fit) {
   const auto information = calib::information_of(problem.camera, problem.views);
   const int n = calib::parameter_count(problem.camera.distortion_model);
@@ -226,14 +230,18 @@ void find_covariance(const Problem& problem, CameraFit& fit) {
     return;
   }
   fit.covariance.topLeftCorner(n, n) = fit.noise_px * fit.noise_px * *inverse;
-  constexpr std::size_t kViewsForScatter = 16;
-  if (information.pulls.size() < kViewsForScatter) return;
-  Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(n, n);
-  for (const Vector8d& pull : information.pulls) scatter += pull.head(n) * pull.head(n).transpose();
-  const auto m = static_cast<double>(information.pulls.size());
-  const Eigen::MatrixXd sandwich = *inverse * scatter * *inverse * (m / (m - n));
+  const std::size_t views = information.pulls.size();
+  if (views < kGroupsForScatter) return;
   fit.sigma_by_views.setZero();
-  fit.sigma_by_views.head(n) = sandwich.diagonal().cwiseSqrt();
+  for (const std::size_t groups : {views, std::min(views, kGroupsForScatter)}) {
+    Eigen::MatrixXd pulls = Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(groups));
+    for (std::size_t i = 0; i < views; ++i) {
+      pulls.col(static_cast<Eigen::Index>(i * groups / views)) += information.pulls[i].head(n);
+    }
+    const auto m = static_cast<double>(groups);
+    const Eigen::VectorXd sigma = (*inverse * pulls).rowwise().norm() * std::sqrt(m / (m - n));
+    fit.sigma_by_views.head(n) = fit.sigma_by_views.head(n).cwiseMax(sigma);
+  }
 }
 
 void fill_views(const Problem& problem, CameraFit& fit) {

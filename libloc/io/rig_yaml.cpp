@@ -31,8 +31,9 @@ double optional_number(YamlBlock& block, const char* key) {
   return block.has(key) ? block.number(key) : kUnknown;
 }
 
-TriadQuality read_quality(YamlBlock block) {
-  TriadQuality quality;
+// What every quality has.
+template <class Quality>
+void read_origin(YamlBlock& block, Quality& quality) {
   const std::string verdict = block.text("verdict");
   try {
     quality.verdict = parse_verdict(verdict);
@@ -40,11 +41,30 @@ TriadQuality read_quality(YamlBlock block) {
     block.fail("verdict", "= '" + verdict + "' is not ok, fair, warn or refused");
   }
   quality.method = block.text("method");
+  quality.reasons = block.texts("reasons");
+}
+
+TriadQuality read_quality(YamlBlock block) {
+  TriadQuality quality;
+  read_origin(block, quality);
   quality.samples = block.integer("samples");
   if (block.has("bias_sigma")) quality.bias_sigma = block.vector3("bias_sigma");
   if (block.has("matrix_sigma")) quality.matrix_sigma = block.matrix("matrix_sigma", 3, 3);
   quality.residual_rms = optional_number(block, "residual_rms");
-  quality.reasons = block.texts("reasons");
+  block.finish();
+  return quality;
+}
+
+IntrinsicsQuality read_intrinsics_quality(YamlBlock block) {
+  IntrinsicsQuality quality;
+  read_origin(block, quality);
+  quality.pictures = block.integer("pictures");
+  const auto sigma = [&](const char* key, Eigen::Vector4d& out) {
+    if (block.has(key)) out = Eigen::Map<const Eigen::Vector4d>(block.numbers(key, 4).data());
+  };
+  sigma("intrinsics_sigma", quality.intrinsics_sigma_px);
+  sigma("distortion_sigma", quality.distortion_sigma);
+  quality.reprojection_rms_px = optional_number(block, "reprojection_rms_px");
   block.finish();
   return quality;
 }
@@ -114,6 +134,9 @@ CameraCalibration read_camera(YamlBlock block) {
   camera.T_body_camera = read_pose(block.block("T_body_camera"));
   camera.time_offset_s = block.number("time_offset_s");
   camera.rate_hz = block.number("rate_hz");
+  if (block.has("intrinsics_quality")) {
+    camera.intrinsics_quality = read_intrinsics_quality(block.block("intrinsics_quality"));
+  }
   block.finish();
   return camera;
 }
@@ -168,23 +191,46 @@ void emit_matrix(YAML::Emitter& out, const char* key, const Eigen::Matrix3d& mat
   out << YAML::EndSeq;
 }
 
-void emit_quality(YAML::Emitter& out, const TriadQuality& quality) {
-  out << YAML::Key << "quality" << YAML::Value << YAML::BeginMap;
+template <class Vector>
+void emit_if_whole(YAML::Emitter& out, const char* key, const Vector& values) {
+  if (values.hasNaN()) return;
+  out << YAML::Key << key << YAML::Value;
+  emit_list(out, values);
+}
+
+template <class Quality>
+void begin_quality(YAML::Emitter& out, const char* key, const Quality& quality) {
+  out << YAML::Key << key << YAML::Value << YAML::BeginMap;
   out << YAML::Key << "verdict" << YAML::Value << verdict_name(quality.verdict);
   out << YAML::Key << "method" << YAML::Value << YAML::DoubleQuoted << quality.method;
-  out << YAML::Key << "samples" << YAML::Value << std::to_string(quality.samples);
-  if (!quality.bias_sigma.hasNaN()) {
-    out << YAML::Key << "bias_sigma" << YAML::Value;
-    emit_list(out, quality.bias_sigma);
-  }
-  if (!quality.matrix_sigma.hasNaN()) emit_matrix(out, "matrix_sigma", quality.matrix_sigma);
-  emit_if_known(out, "residual_rms", quality.residual_rms);
+}
+
+template <class Quality>
+void end_quality(YAML::Emitter& out, const Quality& quality) {
   out << YAML::Key << "reasons" << YAML::Value;
   // A flow list keeps an empty one on its line; sentences get a line each.
   if (quality.reasons.empty()) out << YAML::Flow;
   out << YAML::BeginSeq;
   for (const std::string& reason : quality.reasons) out << YAML::DoubleQuoted << reason;
   out << YAML::EndSeq << YAML::EndMap;
+}
+
+void emit_quality(YAML::Emitter& out, const TriadQuality& quality) {
+  begin_quality(out, "quality", quality);
+  out << YAML::Key << "samples" << YAML::Value << std::to_string(quality.samples);
+  emit_if_whole(out, "bias_sigma", quality.bias_sigma);
+  if (!quality.matrix_sigma.hasNaN()) emit_matrix(out, "matrix_sigma", quality.matrix_sigma);
+  emit_if_known(out, "residual_rms", quality.residual_rms);
+  end_quality(out, quality);
+}
+
+void emit_quality(YAML::Emitter& out, const IntrinsicsQuality& quality) {
+  begin_quality(out, "intrinsics_quality", quality);
+  out << YAML::Key << "pictures" << YAML::Value << std::to_string(quality.pictures);
+  emit_if_whole(out, "intrinsics_sigma", quality.intrinsics_sigma_px);
+  emit_if_whole(out, "distortion_sigma", quality.distortion_sigma);
+  emit_if_known(out, "reprojection_rms_px", quality.reprojection_rms_px);
+  end_quality(out, quality);
 }
 
 void emit_triad(YAML::Emitter& out, const TriadCalibration& triad) {
@@ -258,6 +304,7 @@ void emit_camera(YAML::Emitter& out, const CameraCalibration& camera) {
   out << YAML::EndMap;
   emit_number(out, "time_offset_s", camera.time_offset_s);
   emit_number(out, "rate_hz", camera.rate_hz);
+  if (camera.intrinsics_quality) emit_quality(out, *camera.intrinsics_quality);
   out << YAML::EndMap;
 }
 

@@ -27,17 +27,35 @@ void require_known_or_not_negative(const std::string& name, double value) {
   require(std::isnan(value) || (std::isfinite(value) && value >= 0), name, value, "must not be negative, and finite");
 }
 
+// Known or unknown as a whole: half of a matrix says nothing.
+template <class Matrix>
+void require_whole(const std::string& name, const Matrix& sigma) {
+  const bool fine = sigma.array().isNaN().all() || (sigma.allFinite() && (sigma.array() >= 0).all());
+  require(fine, name + ": must not be negative, and finite (or all NaN: unknown)");
+}
+
+template <class Quality>
+void check_origin(const std::string& name, const Quality& quality) {
+  require_line(name + ".method", quality.method);
+  for (const std::string& reason : quality.reasons) require_line(name + ".reasons", reason);
+}
+
 }  // namespace
 
 void TriadQuality::check(const std::string& name) const {
-  require_line(name + ".method", method);
+  check_origin(name, *this);
   require(samples >= 0, name + ".samples", static_cast<double>(samples), "must not be negative");
-  // Known or unknown as a whole: half of a matrix says nothing.
-  const auto whole = [](const auto& m) { return m.array().isNaN().all() || (m.allFinite() && (m.array() >= 0).all()); };
-  require(whole(bias_sigma), name + ".bias_sigma: must not be negative, and finite (or all NaN: unknown)");
-  require(whole(matrix_sigma), name + ".matrix_sigma: must not be negative, and finite (or all NaN: unknown)");
+  require_whole(name + ".bias_sigma", bias_sigma);
+  require_whole(name + ".matrix_sigma", matrix_sigma);
   require_known_or_not_negative(name + ".residual_rms", residual_rms);
-  for (const std::string& reason : reasons) require_line(name + ".reasons", reason);
+}
+
+void IntrinsicsQuality::check(const std::string& name) const {
+  check_origin(name, *this);
+  require(pictures >= 0, name + ".pictures", static_cast<double>(pictures), "must not be negative");
+  require_whole(name + ".intrinsics_sigma", intrinsics_sigma_px);
+  require_whole(name + ".distortion_sigma", distortion_sigma);
+  require_known_or_not_negative(name + ".reprojection_rms_px", reprojection_rms_px);
 }
 
 void TriadCalibration::check(const std::string& name) const {
@@ -61,6 +79,7 @@ void CameraCalibration::check() const {
   require(std::abs(norm - 1) < 1e-6, who + ".T_cam_imu: norm of its rotation", norm, "must be 1");
   require_finite(who + ".timeshift_cam_imu", time_offset_s);
   require_not_negative(who + ".rate_hz", rate_hz);
+  if (intrinsics_quality) intrinsics_quality->check(who + ".intrinsics_quality");
 }
 
 void ClockCalibration::check() const {
@@ -119,19 +138,20 @@ Measurement calibrated(const Rig& rig, Measurement measurement) {
 
 std::vector<RigDoubt> doubts(const Rig& rig) {
   std::vector<RigDoubt> out;
-  const auto look = [&](const std::string& block, const TriadCalibration& triad) {
-    if (!triad.quality || triad.quality->verdict < Verdict::kWarn) return;
-    std::string text = triad.quality->verdict == Verdict::kRefused
+  const auto look = [&](const std::string& block, const auto& quality) {
+    if (!quality || quality->verdict < Verdict::kWarn) return;
+    std::string text = quality->verdict == Verdict::kRefused
                            ? "the calibration was refused and written all the same (forced)"
                            : "the calibration came with a warning";
-    for (const std::string& reason : triad.quality->reasons) text += "; " + reason;
-    out.push_back({block, triad.quality->verdict, text});
+    for (const std::string& reason : quality->reasons) text += "; " + reason;
+    out.push_back({block, quality->verdict, text});
   };
   if (rig.imu) {
-    look("imu.gyroscope", rig.imu->gyroscope);
-    look("imu.accelerometer", rig.imu->accelerometer);
+    look("imu.gyroscope", rig.imu->gyroscope.quality);
+    look("imu.accelerometer", rig.imu->accelerometer.quality);
   }
-  if (rig.magnetometer) look("magnetometer", rig.magnetometer->triad);
+  if (rig.magnetometer) look("magnetometer", rig.magnetometer->triad.quality);
+  for (const CameraCalibration& camera : rig.cameras) look(camera.name + ".intrinsics", camera.intrinsics_quality);
   return out;
 }
 

@@ -55,6 +55,20 @@ struct MagnetometerCalibration {
 
 enum class DistortionModel { kNone, kRadtan, kEquidistant };
 
+/// How the intrinsics of a camera were found, and how far they may be trusted. A deviation that is not known is NaN.
+struct IntrinsicsQuality {
+  Verdict verdict = Verdict::kOk;
+  std::string method;                                                         ///< "target"
+  std::int64_t pictures = 0;                                                  ///< that were used
+  Eigen::Vector4d intrinsics_sigma_px = Eigen::Vector4d::Constant(kUnknown);  ///< of fx, fy, cx, cy
+  Eigen::Vector4d distortion_sigma = Eigen::Vector4d::Constant(kUnknown);     ///< zero where the model has no such term
+  double reprojection_rms_px = kUnknown;  ///< of the distances between corners found and projected
+  std::vector<std::string> reasons;       ///< of the verdict, one line each
+
+  /// @throws std::invalid_argument naming the field. @param name goes into the message.
+  void check(const std::string& name) const;
+};
+
 struct CameraCalibration {
   std::string name;  ///< "cam0"
   std::int32_t width_px = 0;
@@ -63,8 +77,9 @@ struct CameraCalibration {
   DistortionModel distortion_model = DistortionModel::kNone;
   Eigen::Vector4d distortion = Eigen::Vector4d::Zero();  ///< radtan: k1 k2 p1 p2; equidistant: k1..k4
   Pose3 T_body_camera;
-  double time_offset_s = 0;  ///< t_imu = t_camera + time_offset (Kalibr's timeshift_cam_imu)
-  double rate_hz = 0;        ///< nominal; 0 when unknown
+  double time_offset_s = 0;                             ///< t_imu = t_camera + time_offset (Kalibr's timeshift_cam_imu)
+  double rate_hz = 0;                                   ///< nominal; 0 when unknown
+  std::optional<IntrinsicsQuality> intrinsics_quality;  ///< none: nobody measured it, or the file does not say
 
   /// @throws std::invalid_argument naming the camera, the field and its value.
   void check() const;
@@ -110,7 +125,7 @@ Measurement calibrated(const Rig& rig, Measurement measurement);
 /// What a user should hear about a rig before it is used: a sentence for each calibration that was refused (and written
 /// all the same) or came with a warning.
 struct RigDoubt {
-  std::string block;  ///< "imu.gyroscope", "imu.accelerometer", "magnetometer"
+  std::string block;  ///< "imu.gyroscope", "imu.accelerometer", "magnetometer", "cam0.intrinsics"
   Verdict verdict = Verdict::kWarn;
   std::string text;
 };

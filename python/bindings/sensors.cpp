@@ -294,6 +294,27 @@ void bind_quality(py::module_& m) {
   matrix_property(quality, "matrix_sigma", &TriadQuality::matrix_sigma, "deviation of each entry (3, 3)");
 }
 
+void bind_intrinsics_quality(py::module_& m) {
+  using loc::IntrinsicsQuality;
+  py::class_<IntrinsicsQuality> quality(m, "IntrinsicsQuality",
+                                        "How a camera's intrinsics were found, and how far they may be trusted. A "
+                                        "deviation that is not known is NaN.");
+  quality.def(py::init<>())
+      .def_readwrite("verdict", &IntrinsicsQuality::verdict)
+      .def_readwrite("method", &IntrinsicsQuality::method, "\"target\"")
+      .def_readwrite("pictures", &IntrinsicsQuality::pictures, "that were used")
+      .def_readwrite("reprojection_rms_px", &IntrinsicsQuality::reprojection_rms_px,
+                     "of the distances between corners found and projected")
+      .def_property(
+          "reasons", [](const IntrinsicsQuality& self) { return self.reasons; },
+          [](IntrinsicsQuality& self, std::vector<std::string> reasons) { self.reasons = std::move(reasons); },
+          "Copies of the sentences, one line each: assign a list to change them.");
+  vector4_property(quality, "intrinsics_sigma_px", &IntrinsicsQuality::intrinsics_sigma_px,
+                   "(4,): deviations of fx, fy, cx, cy");
+  vector4_property(quality, "distortion_sigma", &IntrinsicsQuality::distortion_sigma,
+                   "(4,): of the distortion; 0 where the model has no such term");
+}
+
 void bind_clock_calibration(py::module_& m) {
   py::class_<ClockCalibration>(m, "ClockCalibration",
                                "What is known of the clock that stamps a stream. A figure that is not known is NaN.")
@@ -361,6 +382,8 @@ void bind_calibrations(py::module_& m) {
   vector4_property(camera, "intrinsics_px", &CameraCalibration::intrinsics_px, "(4,): fx, fy, cx, cy");
   vector4_property(camera, "distortion", &CameraCalibration::distortion,
                    "(4,): k1 k2 p1 p2 (radtan) or k1..k4 (equidistant)");
+  camera.def_readwrite("intrinsics_quality", &CameraCalibration::intrinsics_quality,
+                       "How the intrinsics were found; None when nobody has said.");
 }
 
 void bind_rig(py::module_& m) {
@@ -398,6 +421,7 @@ void bind_sensors(py::module_& m) {
   bind_noise(m);
   bind_measurements(m);
   bind_quality(m);
+  bind_intrinsics_quality(m);
   bind_calibrations(m);
   bind_clock_calibration(m);
   bind_rig(m);

@@ -35,6 +35,18 @@ TriadQuality full_quality(Random& random) {
   return quality;
 }
 
+IntrinsicsQuality full_intrinsics_quality(Random& random) {
+  IntrinsicsQuality quality;
+  quality.verdict = Verdict::kFair;
+  quality.method = "target";
+  quality.pictures = 9'007'199'254'740'993;
+  quality.intrinsics_sigma_px << random.normal3().cwiseAbs(), 1.0 / 3;
+  quality.distortion_sigma << random.normal3().cwiseAbs(), 0;
+  quality.reprojection_rms_px = 1.0 / 7;
+  quality.reasons = {"only 70 % of the image"};
+  return quality;
+}
+
 Rig full_rig() {
   Random random(11);
   Rig rig;
@@ -61,6 +73,8 @@ Rig full_rig() {
     camera.T_body_camera = {random.rotation(), random.normal3()};
     camera.time_offset_s = -1.0 / 7;
     camera.rate_hz = 20;
+    camera.intrinsics_quality = full_intrinsics_quality(random);
+    if (i == 1) camera.intrinsics_quality = IntrinsicsQuality{.method = "target"};  // the rest is not known
     rig.cameras.push_back(camera);
   }
   rig.gps = GpsCalibration{{0.1, -0.2, 1.0 / 3}};
@@ -104,6 +118,17 @@ void expect_same(const TriadCalibration& a, const TriadCalibration& b) {
   expect_same_or_unknown(a.quality->matrix_sigma, b.quality->matrix_sigma);
   expect_same(a.quality->residual_rms, b.quality->residual_rms);
   EXPECT_EQ(a.quality->reasons, b.quality->reasons);
+}
+
+void expect_same(const std::optional<IntrinsicsQuality>& a, const std::optional<IntrinsicsQuality>& b) {
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a->verdict, b->verdict);
+  EXPECT_EQ(a->method, b->method);
+  EXPECT_EQ(a->pictures, b->pictures);
+  expect_same_or_unknown(a->intrinsics_sigma_px, b->intrinsics_sigma_px);
+  expect_same_or_unknown(a->distortion_sigma, b->distortion_sigma);
+  expect_same(a->reprojection_rms_px, b->reprojection_rms_px);
+  EXPECT_EQ(a->reasons, b->reasons);
 }
 
 class RigYaml : public testing::Test {
@@ -165,6 +190,7 @@ TEST_F(RigYaml, what_is_written_is_read_to_the_last_bit) {
     EXPECT_EQ(a.intrinsics_px, b.intrinsics_px);
     EXPECT_EQ(a.distortion_model, b.distortion_model);
     EXPECT_EQ(a.distortion, b.distortion);
+    expect_same(a.intrinsics_quality, b.intrinsics_quality);
     EXPECT_EQ(a.T_body_camera.rotation.coeffs(), b.T_body_camera.rotation.coeffs());
     EXPECT_EQ(a.T_body_camera.translation, b.T_body_camera.translation);
     EXPECT_EQ(a.time_offset_s, b.time_offset_s);
@@ -278,6 +304,9 @@ TEST_F(RigYaml, errors_name_file_line_and_key) {
   expect_error("rate_hz: 200", "rate_hz: nan", {"imu.rate_hz", "finite"});
   expect_error("rate_hz: 200", "rate_hz: 200 # ok\n  rate_hz: 100", {"changed.yaml:4", "imu.rate_hz", "twice"});
   expect_error("rate_hz: 200", "rate_hz: [200]", {"imu.rate_hz", "not a scalar"});
+  expect_error("verdict: fair", "verdict: great", {"cameras[0].intrinsics_quality.verdict", "great"});
+  expect_error("pictures: 9007199254740993", "pictures: many", {"cameras[0].intrinsics_quality.pictures", "many"});
+  expect_error("pictures: 0", "pictures: -1", {"intrinsics_quality.pictures", "-1"});
   expect_error("[752, 480]", "[752]", {"cameras[0].resolution", "2 numbers"});
   expect_error("[752, 480]", "[752.5, 480]", {"cameras[0].resolution", "whole"});
   expect_error("radtan", "fisheye", {"cameras[0].distortion_model", "fisheye"});

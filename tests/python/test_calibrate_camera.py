@@ -76,6 +76,18 @@ def test_pictures_into_the_rig(folder, tmp_path, capsys):
     (found,) = libloc.read_rig(rig).cameras
     assert (found.name, found.width_px, found.height_px) == ("cam0", 640, 400)
     looks_like_the_camera(found)
+    quality = found.intrinsics_quality
+    assert (quality.method, quality.pictures) == ("target", 14)
+    assert quality.verdict == libloc.Verdict.FAIR
+    assert quality.reasons
+    assert all(reason in text for reason in quality.reasons)
+    assert 0.01 < quality.reprojection_rms_px < 0.1
+    for error, sigma in (
+        (found.intrinsics_px - camera().intrinsics_px, quality.intrinsics_sigma_px),
+        (found.distortion - camera().distortion, quality.distortion_sigma),
+    ):
+        assert (sigma > 0).all()
+        assert (np.abs(error) < 4 * sigma).all()
     names = {path.name for path in (tmp_path / "report").iterdir()}
     assert names == {"report.html", "coverage.png", "residuals.png", "pictures.png", "uncertainty.png"}
 

@@ -104,6 +104,25 @@ TEST(Rig, EveryFieldOfAQualityIsChecked) {
   expect([](TriadQuality& q) { q.reasons = {"two\nlines"}; }, "reasons");
 }
 
+TEST(Rig, EveryFieldOfTheQualityOfIntrinsicsIsChecked) {
+  const auto expect = [](auto change, const std::string& field) {
+    expect_refused(
+        [&](Rig& r) {
+          IntrinsicsQuality& q = r.cameras[0].intrinsics_quality.emplace();
+          q.method = "target";
+          q.check("fine");
+          change(q);
+        },
+        "cam0.intrinsics_quality." + field);
+  };
+  expect([](IntrinsicsQuality& q) { q.method = ""; }, "method");
+  expect([](IntrinsicsQuality& q) { q.pictures = -1; }, "pictures");
+  expect([](IntrinsicsQuality& q) { q.intrinsics_sigma_px = {0, 1, 1, kNan}; }, "intrinsics_sigma");
+  expect([](IntrinsicsQuality& q) { q.distortion_sigma = {0, 1, 1, -1}; }, "distortion_sigma");
+  expect([](IntrinsicsQuality& q) { q.reprojection_rms_px = -1; }, "reprojection_rms_px");
+  expect([](IntrinsicsQuality& q) { q.reasons = {"two\nlines"}; }, "reasons");
+}
+
 TEST(Rig, EveryFieldOfAClockIsChecked) {
   const auto expect = [](auto change, const std::string& field) {
     expect_refused([&](Rig& r) { change(r.clocks[0]); }, field);
@@ -134,8 +153,12 @@ TEST(Rig, DoubtsTellOfWarningsAndOfWhatWasForced) {
   rig.imu->accelerometer.quality = good_quality();
   rig.imu->accelerometer.quality->verdict = Verdict::kWarn;
   rig.imu->accelerometer.quality->reasons = {"10 poses"};
+  rig.cameras[0].intrinsics_quality = IntrinsicsQuality{.verdict = Verdict::kWarn, .method = "target"};
+  rig.cameras[0].intrinsics_quality->reasons = {"no tilt"};
   const auto found = doubts(rig);
-  ASSERT_EQ(found.size(), 2U);
+  ASSERT_EQ(found.size(), 3U);
+  EXPECT_EQ(found[2].block, "cam0.intrinsics");
+  EXPECT_NE(found[2].text.find("warning; no tilt"), std::string::npos) << found[2].text;
   EXPECT_EQ(found[0].block, "imu.accelerometer");
   EXPECT_EQ(found[0].verdict, Verdict::kWarn);
   EXPECT_NE(found[0].text.find("warning; 10 poses"), std::string::npos) << found[0].text;

@@ -9,7 +9,7 @@ import numpy.typing
 import os
 import typing
 from . import so3
-__all__: list[str] = ['AbsoluteError', 'AccelerometerFit', 'AccelerometerOptions', 'Alignment', 'AllanFit', 'AllanOptions', 'AllanTerm', 'AnchoredRun', 'Association', 'CalibrationTarget', 'Camera', 'CameraCalibration', 'CameraFit', 'CameraFitOptions', 'CameraFitView', 'CameraModel', 'CameraRun', 'CarMotion', 'CircleMotion', 'ClockCalibration', 'ClockCalibrationResult', 'ClockChain', 'ClockLine', 'ClockModel', 'Consistency', 'CounterUnwrapper', 'DataError', 'DiscreteImuNoise', 'DistortionModel', 'ESTIMATE_CHANNEL', 'EllipsoidAdvice', 'EllipsoidCollector', 'EllipsoidFit', 'EllipsoidOptions', 'EqvioSource', 'ErrorStateFilter', 'ErrorStateOptions', 'ErrorStateRun', 'ErrorStatistics', 'Estimate', 'EstimateStatus', 'EstimateValid', 'FUSION_CHANNEL', 'FeatureTracker', 'FeatureTrackerOptions', 'FeatureTrackerTimes', 'FeatureVideo', 'FeaturesArrays', 'FeaturesMeasurement', 'FigureEightMotion', 'FusionOutcome', 'FusionPreset', 'FusionPresetSensors', 'FusionResult', 'FusionStartOptions', 'GPS_CHANNEL', 'GpsArrays', 'GpsCalibration', 'GpsClock', 'GpsFixType', 'GpsMeasurement', 'GpsModel', 'GyroscopeFit', 'GyroscopeOptions', 'HAS_VISION', 'HandHeldMotion', 'IMAGE_CHANNEL', 'IMU_CHANNEL', 'ImageMeasurement', 'ImageSlam', 'ImuAllan', 'ImuArrays', 'ImuCalibration', 'ImuIntegration', 'ImuMeasurement', 'ImuModel', 'ImuNoise', 'ImuNoiseFit', 'ImuSampleModel', 'ImuSampling', 'InertialSlam', 'InertialTriadModel', 'InverseDepthPoint', 'KnownLandmark', 'LcmLogReader', 'LocalFrame', 'LookAtMotion', 'MAGNETOMETER_CHANNEL', 'MadgwickFilter', 'MadgwickOptions', 'MadgwickResult', 'MagnetometerAlignment', 'MagnetometerAlignmentOptions', 'MagnetometerArrays', 'MagnetometerCalibration', 'MagnetometerMeasurement', 'MagnetometerModel', 'MapAnchorOptions', 'MeasurementSource', 'MonoSlam', 'Motion', 'MotionArrays', 'MountedMotion', 'NO_TIME', 'NmeaFixes', 'ODOMETRY_CHANNEL', 'OdometryArrays', 'OdometryMeasurement', 'OrientationError', 'PedestrianMotion', 'Pose3', 'PredictOutcome', 'Quality', 'REFERENCE_CHANNEL', 'Random', 'Recording', 'ReferenceArrays', 'ReferenceMeasurement', 'RelativeError', 'RestFirstMotion', 'RestMotion', 'RestNoise', 'Rig', 'SOURCE_STATUS_CHANNEL', 'STATISTICS_CHANNEL', 'Scenario', 'ScenarioStreams', 'Scene', 'SceneRenderer', 'SimulatedRun', 'Simulation', 'SlamAssociationOptions', 'SlamConsistency', 'SlamCounts', 'SlamFeatureArrays', 'SlamFeatureState', 'SlamFile', 'SlamFrame', 'SlamLandmarkArrays', 'SlamMapArrays', 'SlamMapOptions', 'SlamMotion', 'SlamOptions', 'SlamPrecision', 'SlamPredictionArrays', 'SlamRun', 'SlamSnapshot', 'SlamStartOptions', 'StandStillOptions', 'StillSegment', 'Stillness', 'StillnessDetector', 'StillnessOptions', 'StreamClockModel', 'StreetModel', 'TRACKS_CHANNEL', 'TargetDetection', 'TargetDetector', 'TargetView', 'TimeOffsetResult', 'TrackArrays', 'TrackOrigin', 'Trajectory', 'TriadCalibration', 'TriadQuality', 'TruthArrays', 'Verdict', 'VisualOdometryModel', 'WaypointMotion', 'absolute_error', 'align_magnetometer', 'align_points', 'aligned', 'allan_fit', 'analyse_imu_noise', 'anchor_run', 'april_grid', 'associate', 'average_consistency', 'beta_from_gyro', 'box_room', 'calibrate_camera', 'calibrate_clock', 'checkerboard', 'chi_square_cdf', 'chi_square_quantile', 'choose_views', 'decode_image', 'discretise', 'error_statistics', 'estimate_time_offset', 'euroc_cameras', 'example_drive', 'find_stillness', 'finds_april_grids', 'fit_accelerometer', 'fit_accelerometer_poses', 'fit_ellipsoid', 'fit_gyroscope', 'fit_gyroscope_bias', 'format_seconds', 'gps_from_unix', 'image_array', 'image_measurement', 'imu_noise_from', 'is_eqvio', 'leap_seconds_known_until', 'load_slam', 'local_positions', 'message_fingerprints', 'message_type', 'normalised_error_squared', 'open_broad', 'open_csv', 'open_eqvio', 'open_euroc', 'open_euroc_images', 'open_image_folder', 'open_lcm_log', 'open_nmea', 'open_video', 'orientation_error', 'parse_nmea', 'parse_seconds', 'quantile', 'read_any_rig', 'read_points', 'read_rig', 'read_slam_options', 'read_tracks', 'read_tum', 'relative_error', 'root_mean_square', 'sampled_path', 'save_slam', 'scenario_names', 'simulate', 'simulate_camera', 'simulate_clock', 'simulate_gps_time', 'slam_options_for_images', 'slam_options_text', 'so3', 'street', 'unix_from_gps', 'update_rig', 'write_geojson', 'write_gpx', 'write_kml', 'write_ply', 'write_points', 'write_rig', 'write_slam_options', 'write_tracks', 'write_tum']
+__all__: list[str] = ['AbsoluteError', 'AccelerometerFit', 'AccelerometerOptions', 'Alignment', 'AllanFit', 'AllanOptions', 'AllanTerm', 'AnchoredRun', 'Association', 'CalibrationTarget', 'Camera', 'CameraCalibration', 'CameraFit', 'CameraFitOptions', 'CameraFitView', 'CameraModel', 'CameraRun', 'CarMotion', 'CircleMotion', 'ClockCalibration', 'ClockCalibrationResult', 'ClockChain', 'ClockLine', 'ClockModel', 'Consistency', 'CounterUnwrapper', 'DataError', 'DiscreteImuNoise', 'DistortionModel', 'ESTIMATE_CHANNEL', 'EllipsoidAdvice', 'EllipsoidCollector', 'EllipsoidFit', 'EllipsoidOptions', 'EqvioSource', 'ErrorStateFilter', 'ErrorStateOptions', 'ErrorStateRun', 'ErrorStatistics', 'Estimate', 'EstimateStatus', 'EstimateValid', 'FUSION_CHANNEL', 'FeatureTracker', 'FeatureTrackerOptions', 'FeatureTrackerTimes', 'FeatureVideo', 'FeaturesArrays', 'FeaturesMeasurement', 'FigureEightMotion', 'FusionOutcome', 'FusionPreset', 'FusionPresetSensors', 'FusionResult', 'FusionStartOptions', 'GPS_CHANNEL', 'GpsArrays', 'GpsCalibration', 'GpsClock', 'GpsFixType', 'GpsMeasurement', 'GpsModel', 'GyroscopeFit', 'GyroscopeOptions', 'HAS_VISION', 'HandHeldMotion', 'IMAGE_CHANNEL', 'IMU_CHANNEL', 'ImageMeasurement', 'ImageSlam', 'ImuAllan', 'ImuArrays', 'ImuCalibration', 'ImuIntegration', 'ImuMeasurement', 'ImuModel', 'ImuNoise', 'ImuNoiseFit', 'ImuSampleModel', 'ImuSampling', 'InertialSlam', 'InertialTriadModel', 'IntrinsicsQuality', 'InverseDepthPoint', 'KnownLandmark', 'LcmLogReader', 'LocalFrame', 'LookAtMotion', 'MAGNETOMETER_CHANNEL', 'MadgwickFilter', 'MadgwickOptions', 'MadgwickResult', 'MagnetometerAlignment', 'MagnetometerAlignmentOptions', 'MagnetometerArrays', 'MagnetometerCalibration', 'MagnetometerMeasurement', 'MagnetometerModel', 'MapAnchorOptions', 'MeasurementSource', 'MonoSlam', 'Motion', 'MotionArrays', 'MountedMotion', 'NO_TIME', 'NmeaFixes', 'ODOMETRY_CHANNEL', 'OdometryArrays', 'OdometryMeasurement', 'OrientationError', 'PedestrianMotion', 'Pose3', 'PredictOutcome', 'Quality', 'REFERENCE_CHANNEL', 'Random', 'Recording', 'ReferenceArrays', 'ReferenceMeasurement', 'RelativeError', 'RestFirstMotion', 'RestMotion', 'RestNoise', 'Rig', 'SOURCE_STATUS_CHANNEL', 'STATISTICS_CHANNEL', 'Scenario', 'ScenarioStreams', 'Scene', 'SceneRenderer', 'SimulatedRun', 'Simulation', 'SlamAssociationOptions', 'SlamConsistency', 'SlamCounts', 'SlamFeatureArrays', 'SlamFeatureState', 'SlamFile', 'SlamFrame', 'SlamLandmarkArrays', 'SlamMapArrays', 'SlamMapOptions', 'SlamMotion', 'SlamOptions', 'SlamPrecision', 'SlamPredictionArrays', 'SlamRun', 'SlamSnapshot', 'SlamStartOptions', 'StandStillOptions', 'StillSegment', 'Stillness', 'StillnessDetector', 'StillnessOptions', 'StreamClockModel', 'StreetModel', 'TRACKS_CHANNEL', 'TargetDetection', 'TargetDetector', 'TargetView', 'TimeOffsetResult', 'TrackArrays', 'TrackOrigin', 'Trajectory', 'TriadCalibration', 'TriadQuality', 'TruthArrays', 'Verdict', 'VisualOdometryModel', 'WaypointMotion', 'absolute_error', 'align_magnetometer', 'align_points', 'aligned', 'allan_fit', 'analyse_imu_noise', 'anchor_run', 'april_grid', 'associate', 'average_consistency', 'beta_from_gyro', 'box_room', 'calibrate_camera', 'calibrate_clock', 'checkerboard', 'chi_square_cdf', 'chi_square_quantile', 'choose_views', 'decode_image', 'discretise', 'error_statistics', 'estimate_time_offset', 'euroc_cameras', 'example_drive', 'find_stillness', 'finds_april_grids', 'fit_accelerometer', 'fit_accelerometer_poses', 'fit_ellipsoid', 'fit_gyroscope', 'fit_gyroscope_bias', 'format_seconds', 'gps_from_unix', 'image_array', 'image_measurement', 'imu_noise_from', 'is_eqvio', 'leap_seconds_known_until', 'load_slam', 'local_positions', 'message_fingerprints', 'message_type', 'normalised_error_squared', 'open_broad', 'open_csv', 'open_eqvio', 'open_euroc', 'open_euroc_images', 'open_image_folder', 'open_lcm_log', 'open_nmea', 'open_video', 'orientation_error', 'parse_nmea', 'parse_seconds', 'quantile', 'read_any_rig', 'read_points', 'read_rig', 'read_slam_options', 'read_tracks', 'read_tum', 'relative_error', 'root_mean_square', 'sampled_path', 'save_slam', 'scenario_names', 'simulate', 'simulate_camera', 'simulate_clock', 'simulate_gps_time', 'slam_options_for_images', 'slam_options_text', 'so3', 'street', 'unix_from_gps', 'update_rig', 'write_geojson', 'write_gpx', 'write_kml', 'write_ply', 'write_points', 'write_rig', 'write_slam_options', 'write_tracks', 'write_tum']
 class DataError(ValueError):
     """
     What is wrong in a file or message: where (file, line or byte), which field, which value.
@@ -714,6 +714,61 @@ class TriadQuality:
     @samples.setter
     def samples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
+class IntrinsicsQuality:
+    """
+    How a camera's intrinsics were found, and how far they may be trusted. A deviation that is not known is NaN.
+    """
+    verdict: Verdict
+    def __init__(self) -> None:
+        ...
+    @property
+    def distortion_sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (4,): of the distortion; 0 where the model has no such term
+        """
+    @distortion_sigma.setter
+    def distortion_sigma(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def intrinsics_sigma_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (4,): deviations of fx, fy, cx, cy
+        """
+    @intrinsics_sigma_px.setter
+    def intrinsics_sigma_px(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def method(self) -> str:
+        """
+        "target"
+        """
+    @method.setter
+    def method(self, arg0: str) -> None:
+        ...
+    @property
+    def pictures(self) -> int:
+        """
+        that were used
+        """
+    @pictures.setter
+    def pictures(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def reasons(self) -> list[str]:
+        """
+        Copies of the sentences, one line each: assign a list to change them.
+        """
+    @reasons.setter
+    def reasons(self, arg1: collections.abc.Sequence[str]) -> None:
+        ...
+    @property
+    def reprojection_rms_px(self) -> float:
+        """
+        of the distances between corners found and projected
+        """
+    @reprojection_rms_px.setter
+    def reprojection_rms_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
 class TriadCalibration:
     """
     corrected = matrix @ (raw - bias)
@@ -867,6 +922,14 @@ class CameraCalibration:
         """
     @intrinsics_px.setter
     def intrinsics_px(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def intrinsics_quality(self) -> IntrinsicsQuality | None:
+        """
+        How the intrinsics were found; None when nobody has said.
+        """
+    @intrinsics_quality.setter
+    def intrinsics_quality(self, arg0: IntrinsicsQuality | None) -> None:
         ...
     @property
     def rate_hz(self) -> float:

@@ -237,6 +237,12 @@ def _apply(fit: libloc.CameraFit, name: str, rig: libloc.Rig) -> None:
     camera.intrinsics_px = fit.camera.intrinsics_px
     camera.distortion_model = fit.camera.distortion_model
     camera.distortion = fit.camera.distortion
+    quality = libloc.IntrinsicsQuality()
+    quality.verdict, quality.reasons = fit.quality.verdict, list(fit.quality.reasons)
+    quality.method, quality.pictures = "target", fit.views_used
+    quality.intrinsics_sigma_px, quality.distortion_sigma = fit.sigma[:4], fit.sigma[4:]
+    quality.reprojection_rms_px = fit.rms_px
+    camera.intrinsics_quality = quality
     if at is None:
         cameras.append(camera)
     else:
