@@ -1,0 +1,26 @@
+// The cumulative rotation spline in one segment, for those who keep the differences of its control points. Internal to
+// calib.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <span>
+
+#include "libloc/calib/spline.hpp"
+#include "libloc/calib/spline_grid.hpp"
+
+namespace loc::calib {
+
+/// d_j = Log(R_{j-1}^T R_j), and how it changes: d d_j = right_inverse e_j - right_inverse^T e_{j-1}.
+struct RotationStep {
+  Eigen::Vector3d difference = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d right_inverse = Eigen::Matrix3d::Identity();
+};
+RotationStep step_between(const Eigen::Quaterniond& from, const Eigen::Quaterniond& to);
+
+/// @param first the segment's first control point  @param steps the order - 1 steps from there
+/// @param weights cumulative; the order is one more than the number of steps
+RotationState rotation_at(const Eigen::Quaterniond& first, std::span<const RotationStep> steps,
+                          const SplineWeights& weights, RotationJacobians* jacobians);
+
+}  // namespace loc::calib
