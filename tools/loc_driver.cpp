@@ -30,7 +30,6 @@
 namespace {
 
 // An estimator's queue holds four pictures: no more may be on their way, at 200 IMU samples a second and 50 pictures.
-constexpr std::int64_t kWindowWithPictures = 16;
 
 #if defined(LOC_HAVE_VISION)
 std::unique_ptr<loc::MeasurementSource> open(const loc::SourceSpec& source, char** /*argv*/) {
@@ -116,9 +115,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   CLI::Option* wait = app.add_option("--wait-for-estimator", wait_for_estimator,
                                      "Seconds to wait for an estimator before the first sample");
-  CLI::Option* window =
-      app.add_option("--window", options.window, "With --speed max: IMU samples on their way at a time");
-  window->capture_default_str();
+  app.add_option("--window", options.window, "With --speed max: IMU samples on their way at a time")
+      ->capture_default_str();
   app.add_option("--answer-timeout", options.answer_timeout_s,
                  "With --speed max: seconds of silence after which the estimator counts as gone")
       ->capture_default_str();
@@ -138,12 +136,6 @@ int main(int argc, char** argv) {
       const loc::Rig rig = loc::load_rig(config);
       // Its pixels are those of a camera: of the user's, where there is one.
       if (!rig.cameras.empty()) source.eqvio.camera = rig.cameras.front();
-    }
-    if (options.speed == 0 && loc::needs_vision(source)) {
-      const bool imu = source.kind == "euroc" || !source.images.imu_file.empty();
-      if (!imu)
-        throw loc::UsageError("--speed max is the pace at which the estimator takes IMU samples; here are none");
-      if (window->count() == 0) options.window = kWindowWithPictures;
     }
     options.live = loc::is_live(source.kind);
     // Before a device is touched.

@@ -293,7 +293,6 @@ TEST_F(PictureDriver, AFolderOfPicturesAsGreyAndAsJpeg) {
   EXPECT_NE(log().find("needs a rate"), std::string::npos) << log();
   EXPECT_EQ(usage({folder_.path("none"), "--rate-hz", "5"}), 2);
   EXPECT_EQ(usage({folder_.path("p"), "--rate-hz", "5", "--names", "ns"}), 2);
-  EXPECT_EQ(usage({folder_.path("p"), "--rate-hz", "5", "--speed", "max"}), 2);
 }
 
 TEST_F(PictureDriver, EurocWithItsPicturesAndAVideoWithItsImu) {

@@ -224,7 +224,7 @@ TEST_F(Programs, DriverSaysThatNobodyAnswers) {
   EXPECT_EQ(run_program("loc-driver", {"csv", path("r.csv"), "--speed", "max", "--window", "10", "--answer-timeout",
                                        "0.3", "--lcm-url", hub.url}),
             1);
-  EXPECT_NE(errors("loc-driver").find("no estimator takes the samples: 10 IMU samples"), std::string::npos)
+  EXPECT_NE(errors("loc-driver").find("no estimator takes the samples: 10 of stream imu"), std::string::npos)
       << errors("loc-driver");
   EXPECT_EQ(run_program("loc-driver", {"csv", path("r.csv"), "--wait-for-estimator", "0.3", "--lcm-url", hub.url}), 1);
   EXPECT_NE(errors("loc-driver").find("no estimator has answered"), std::string::npos) << errors("loc-driver");

@@ -133,14 +133,14 @@ Bytes answer(std::int64_t imu_sequence, int process_id = 1) {
   statistics_t message{};
   message.program = kEstimatorProgram;
   message.process_id = process_id;
-  message.name = {kImuSequence};
+  message.name = {sequence_name(StreamKind::kImu)};
   message.value = {static_cast<double>(imu_sequence)};
   message.size = 1;
   return encoded(message);
 }
 
 TEST(FlowControl, KeepsTheWindow) {
-  FlowControl flow(3);
+  FlowControl flow(StreamKind::kImu, 3);
   for (std::int64_t i = 0; i < 3; ++i) {
     EXPECT_TRUE(flow.may_send());
     flow.sent(i);
@@ -160,7 +160,7 @@ TEST(FlowControl, KeepsTheWindow) {
 }
 
 TEST(FlowControl, GivesUpSamplesThatWereLost) {
-  FlowControl flow(2);
+  FlowControl flow(StreamKind::kImu, 2);
   flow.sent(0);
   flow.sent(1);
   flow.on_statistics(answer(0), 0);
@@ -174,7 +174,7 @@ TEST(FlowControl, GivesUpSamplesThatWereLost) {
 }
 
 TEST(FlowControl, AnEstimatorThatWasStartedAnewKnowsNothingOfTheOldWindow) {
-  FlowControl flow(2);
+  FlowControl flow(StreamKind::kImu, 2);
   flow.on_statistics(answer(-1, 100), 0);
   flow.sent(0);
   flow.sent(1);
@@ -183,8 +183,51 @@ TEST(FlowControl, AnEstimatorThatWasStartedAnewKnowsNothingOfTheOldWindow) {
   EXPECT_EQ(flow.abandoned(), 2);
 }
 
+// Pictures are acknowledged by answers only, and not waited for where the estimator takes none.
+TEST(FlowControl, FollowsPicturesWhereTheEstimatorTakesThem) {
+  FlowControl flow(StreamKind::kImage, 2);
+  flow.sent(0);
+  flow.sent(1);
+  estimate_t estimate{};
+  estimate.sequence = 1;
+  flow.on_estimate(encoded(estimate));
+  EXPECT_FALSE(flow.may_send()) << "nobody has answered yet";
+  EXPECT_TRUE(flow.waits());
+  statistics_t message{};
+  message.program = kEstimatorProgram;
+  message.name = {"imu.sequence", "image.sequence"};
+  message.value = {7, 0};
+  message.size = 2;
+  flow.on_statistics(encoded(message), 0);
+  EXPECT_EQ(flow.outstanding(), 1);
+  EXPECT_TRUE(flow.may_send());
+  flow.sent(2);
+  EXPECT_FALSE(flow.may_send());
+  flow.on_statistics(answer(8), 0);  // another method now: without pictures
+  EXPECT_TRUE(flow.may_send());
+  EXPECT_FALSE(flow.waits());
+}
+
+TEST(FlowControl, PicturesOfOtherCamerasHaveArrivedWhenALaterOneHas) {
+  FlowControl flow(StreamKind::kImage, 4);
+  flow.sent(10, 0);
+  flow.sent(2, 1);
+  flow.sent(11, 0);
+  flow.sent(3, 1);
+  statistics_t message{};
+  message.program = kEstimatorProgram;
+  message.name = {"image.sequence", "image.camera"};
+  message.value = {11, 0};
+  message.size = 2;
+  flow.on_statistics(encoded(message), 0);
+  EXPECT_EQ(flow.outstanding(), 1);
+  message.value = {3, 1};
+  flow.on_statistics(encoded(message), 0);
+  EXPECT_EQ(flow.outstanding(), 0);
+}
+
 TEST(FlowControl, GarbageChangesNothing) {
-  FlowControl flow(1);
+  FlowControl flow(StreamKind::kImu, 1);
   flow.sent(0);
   flow.on_estimate(Bytes(200, 0xff));
   flow.on_statistics(Bytes{1, 2, 3}, 0);
@@ -249,6 +292,8 @@ TEST(SequenceCheck, EachCameraCountsForItself) {
   EXPECT_EQ(check.counts(StreamKind::kFeatures).restarts, 0);
   EXPECT_EQ(check.counts(StreamKind::kOdometry).restarts, 1);
   EXPECT_EQ(check.last(StreamKind::kOdometry), 3);
+  EXPECT_EQ(check.last(StreamKind::kFeatures), 45);
+  EXPECT_EQ(check.last_camera(StreamKind::kFeatures), 1);
   EXPECT_EQ(SequenceCheck().last(StreamKind::kFeatures), -1);
   EXPECT_EQ(SequenceCheck().last(StreamKind::kOdometry), -1);
 }

@@ -1,5 +1,6 @@
 #include "tools/support/driver.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "libloc/core/check.hpp"
@@ -14,6 +15,8 @@ namespace {
 constexpr TimeNs kSecond = 1'000'000'000;
 constexpr TimeNs kAskEvery = 20'000'000;  // while waiting for the estimator
 constexpr int kPollMs = 5;
+constexpr std::int64_t kPicturesOnTheirWay = 4;  // an estimator drops the oldest of more
+constexpr std::int64_t kFeatureFramesOnTheirWay = 64;
 constexpr double kLongestS = 1e9;  // 30 years
 constexpr double kLongestWaitS = 1e6;
 
@@ -43,14 +46,20 @@ Driver::Driver(DriverOptions options, std::unique_ptr<MeasurementSource> source)
       source_(std::move(source)),
       publisher_(options_.lcm_url),
       pacer_(options_.speed),
-      flow_(options_.window) {
+      flows_{{StreamKind::kImu, options_.window},
+             {StreamKind::kImage, kPicturesOnTheirWay},
+             {StreamKind::kFeatures, kFeatureFramesOnTheirWay}} {
   for (std::size_t i = 0; i < kStreamKinds; ++i) {
     if (options_.channels[i].empty()) options_.channels[i] = default_channel(static_cast<StreamKind>(i));
   }
   if (options_.speed > 0 && !options_.wait_for_estimator_s) return;
   receiver_.emplace(options_.lcm_url);
-  receiver_->subscribe(kEstimateChannel, [this](auto, auto data) { flow_.on_estimate(data); });
-  receiver_->subscribe(kStatisticsChannel, [this](auto, auto data) { flow_.on_statistics(data, steady_now()); });
+  receiver_->subscribe(kEstimateChannel, [this](auto, auto data) {
+    for (FlowControl& flow : flows_) flow.on_estimate(data);
+  });
+  receiver_->subscribe(kStatisticsChannel, [this](auto, auto data) {
+    for (FlowControl& flow : flows_) flow.on_statistics(data, steady_now());
+  });
 }
 
 void Driver::run() {
@@ -91,13 +100,7 @@ void Driver::publish_all() {
     }
     if (duration_ns > 0 && time - *begin >= duration_ns) return;
     if (!sleep_for(pacer_.wait_ns(time, steady_now()))) return;
-    if (options_.speed == 0) {
-      if (kind_of(*measurement) == StreamKind::kImu) {
-        wait_for_window();
-      } else {
-        poll_answers(0);
-      }
-    }
+    if (options_.speed == 0) wait_for_window(kind_of(*measurement));
     if (stop_requested()) return;
     publish_measurement(*measurement);
     report_each_second();
@@ -112,7 +115,7 @@ void Driver::poll_answers(int timeout_ms) {
 
 void Driver::wait_for_estimator() {
   const TimeNs give_up = steady_now() + from_seconds(*options_.wait_for_estimator_s);
-  while (!flow_.answered() && !stop_requested()) {
+  while (!flows_.front().answered() && !stop_requested()) {
     if (steady_now() > give_up) {
       throw std::runtime_error("no estimator has answered on " + options_.lcm_url + " within " +
                                std::to_string(*options_.wait_for_estimator_s) + " s: is loc-estimator running there?");
@@ -122,27 +125,39 @@ void Driver::wait_for_estimator() {
   }
 }
 
-void Driver::wait_for_window() {
+std::int64_t Driver::outstanding() const {
+  std::int64_t sum = 0;
+  for (const FlowControl& flow : flows_) {
+    if (flow.waits()) sum += flow.outstanding();
+  }
+  return sum;
+}
+
+void Driver::wait_for_window(StreamKind kind) {
   poll_answers(0);
-  if (flow_.may_send()) return;
+  const auto paced = std::ranges::find(flows_, kind, &FlowControl::kind);
+  if (paced == flows_.end() || paced->may_send()) return;
+  const FlowControl& flow = *paced;
   const TimeNs begin = steady_now();
   TimeNs heard = begin;  // last time that something was taken
-  TimeNs ask = begin + kAskEvery;
-  std::int64_t outstanding = flow_.outstanding();
-  while (!flow_.may_send() && !stop_requested()) {
-    poll_answers(kPollMs);
-    const TimeNs now = steady_now();
-    if (flow_.outstanding() != outstanding) {
-      outstanding = flow_.outstanding();
-      heard = now;
-    }
+  // IMU samples are acknowledged by estimates; of frames only an answer tells.
+  TimeNs ask = kind == StreamKind::kImu ? begin + kAskEvery : begin;
+  std::int64_t outstanding = flow.outstanding();
+  while (!flow.may_send() && !stop_requested()) {
+    TimeNs now = steady_now();
     if (now >= ask) {
       publish_status(source_status_t::STATE_RUNNING, "");
       ask = now + kAskEvery;
     }
+    poll_answers(kPollMs);
+    now = steady_now();
+    if (flow.outstanding() != outstanding) {
+      outstanding = flow.outstanding();
+      heard = now;
+    }
     if (now - heard > from_seconds(options_.answer_timeout_s)) {
-      throw std::runtime_error("no estimator takes the samples: " + std::to_string(outstanding) +
-                               " IMU samples are on their way on " + options_.lcm_url +
+      throw std::runtime_error("no estimator takes the samples: " + std::to_string(outstanding) + " of stream " +
+                               stream_name(kind) + " are on their way on " + options_.lcm_url +
                                " and nothing was answered for " + std::to_string(options_.answer_timeout_s) +
                                " s (without an estimator, use --speed N)");
     }
@@ -154,12 +169,12 @@ void Driver::wait_for_window() {
 void Driver::wait_until_taken() {
   const TimeNs give_up = steady_now() + from_seconds(options_.answer_timeout_s);
   TimeNs ask = steady_now() + kAskEvery;
-  while (flow_.outstanding() > 0 && !stop_requested()) {
+  while (outstanding() > 0 && !stop_requested()) {
     poll_answers(kPollMs);
     const TimeNs now = steady_now();
     if (now > give_up) {
-      throw std::runtime_error("the estimator has not answered for the last " + std::to_string(flow_.outstanding()) +
-                               " IMU samples");
+      throw std::runtime_error("the estimator has not answered for the last " + std::to_string(outstanding()) +
+                               " samples");
     }
     if (now >= ask) {
       publish_status(source_status_t::STATE_ENDED, "");
@@ -198,7 +213,9 @@ void Driver::publish_measurement(Measurement& measurement) {
   const std::string& channel = options_.channels[static_cast<std::size_t>(kind)];
   if (!std::visit([&](const auto& m) { return send(channel, to_message(m)); }, measurement)) return;
   ++published_[static_cast<std::size_t>(kind)];
-  if (kind == StreamKind::kImu) flow_.sent(stamp.sequence);
+  if (options_.speed > 0) return;
+  const auto paced = std::ranges::find(flows_, kind, &FlowControl::kind);
+  if (paced != flows_.end()) paced->sent(stamp.sequence, camera_of(measurement));
 }
 
 void Driver::publish_status(std::int8_t state, const std::string& text) {
@@ -259,8 +276,10 @@ NamedCounts Driver::counts() const {
     out.push_back({"pace.restarts", pacer_.restarts()});
     out.push_back({"pace.max_lag_us", pacer_.max_lag_ns() / 1000});
   } else {
-    out.push_back({"window.outstanding", flow_.outstanding()});
-    out.push_back({"window.abandoned", flow_.abandoned()});
+    std::int64_t abandoned = 0;
+    for (const FlowControl& flow : flows_) abandoned += flow.abandoned();
+    out.push_back({"window.outstanding", outstanding()});
+    out.push_back({"window.abandoned", abandoned});
     out.push_back({"window.waited_ms", window_wait_ns_ / 1'000'000});
   }
   return out;

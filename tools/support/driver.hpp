@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "libloc/io/source.hpp"
 #include "loc/source_status_t.hpp"
@@ -56,7 +57,8 @@ class Driver {
   void publish_all();
   bool duration_is_over() const;
   void wait_for_estimator();
-  void wait_for_window();
+  void wait_for_window(StreamKind kind);
+  std::int64_t outstanding() const;
   void wait_until_taken();
   void poll_answers(int timeout_ms);
   void publish_measurement(Measurement& measurement);
@@ -70,7 +72,7 @@ class Driver {
   LcmPublisher publisher_;
   std::optional<LcmReceiver> receiver_;  // while answers matter
   Pacer pacer_;
-  FlowControl flow_;
+  std::vector<FlowControl> flows_;  // one for each kind that paces
   std::map<std::pair<StreamKind, int>, std::int64_t> next_sequence_;
   std::array<std::int64_t, kStreamKinds> published_{};
   std::int64_t left_out_ = 0;  // before start

@@ -246,7 +246,12 @@ void LiveEstimator::report_each_second() {
 }
 
 NamedCounts LiveEstimator::counts() const {
-  NamedCounts out = {{kImuSequence, pipeline_.sequences().last(StreamKind::kImu)}};
+  NamedCounts out;
+  for (const StreamKind kind : inputs_) {
+    if (!is_paced(kind)) continue;
+    out.push_back({sequence_name(kind), pipeline_.sequences().last(kind)});
+    if (kind != StreamKind::kImu) out.push_back({camera_name(kind), pipeline_.sequences().last_camera(kind)});
+  }
   for (NamedCount& count : pipeline_.counts()) out.push_back(std::move(count));
   for (NamedCount& count : queues_.counts()) out.push_back(std::move(count));
   for (NamedCount& count : decoder_.counts()) out.push_back(std::move(count));

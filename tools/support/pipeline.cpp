@@ -34,7 +34,7 @@ void SequenceCheck::see(const Measurement& measurement) {
   Counts& counts = counts_[static_cast<std::size_t>(kind)];
   ++counts.received;
   if (sequence < 0) return;
-  last_of_kind_[static_cast<std::size_t>(kind)] = sequence;
+  last_of_kind_[static_cast<std::size_t>(kind)] = {sequence, camera_of(measurement)};
   const auto [place, first] = last_.try_emplace({kind, camera_of(measurement)}, sequence);
   if (first) return;
   std::int64_t& last = place->second;

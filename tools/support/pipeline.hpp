@@ -31,11 +31,17 @@ class SequenceCheck {
   void see(const Measurement& measurement);
   const Counts& counts(StreamKind kind) const { return counts_[static_cast<std::size_t>(kind)]; }
   /// Sequence number of the last sample of this kind; -1 before the first.
-  std::int64_t last(StreamKind kind) const { return last_of_kind_[static_cast<std::size_t>(kind)]; }
+  std::int64_t last(StreamKind kind) const { return last_of_kind_[static_cast<std::size_t>(kind)].sequence; }
+  /// Its camera; 0 for other streams.
+  int last_camera(StreamKind kind) const { return last_of_kind_[static_cast<std::size_t>(kind)].camera; }
 
  private:
+  struct Last {
+    std::int64_t sequence = -1;
+    int camera = 0;
+  };
   std::array<Counts, kStreamKinds> counts_{};
-  std::array<std::int64_t, kStreamKinds> last_of_kind_ = {-1, -1, -1, -1, -1, -1, -1};
+  std::array<Last, kStreamKinds> last_of_kind_;
   std::map<std::pair<StreamKind, int>, std::int64_t> last_;
 };
 
