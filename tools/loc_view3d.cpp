@@ -6,11 +6,21 @@
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <set>
 #include <thread>
 
 #include "libloc/core/check.hpp"
 #include "libloc/io/lcm_log.hpp"
 #include "libloc/vision/image_file.hpp"
+#include "loc/estimate_t.hpp"
+#include "loc/fusion_t.hpp"
+#include "loc/gps_fix_t.hpp"
+#include "loc/image_t.hpp"
+#include "loc/imu_t.hpp"
+#include "loc/map_points_t.hpp"
+#include "loc/reference_t.hpp"
+#include "loc/slam_frame_t.hpp"
+#include "msgs/wire.hpp"
 #include "tools/support/channels.hpp"
 #include "tools/support/lcm_link.hpp"
 #include "tools/support/log.hpp"
@@ -19,6 +29,7 @@
 #include "tools/support/rig_option.hpp"
 #include "tools/support/scene3d_drawing.hpp"
 #include "tools/support/scene3d_recorder.hpp"
+#include "tools/support/stamp_guard.hpp"
 #include "tools/support/statistics.hpp"
 #ifdef LOC_HAVE_MRPT_GUI
 #include "tools/support/scene3d_window.hpp"
@@ -52,24 +63,44 @@ struct Arguments {
   bool window() const { return png.empty() && png_folder.empty() && scene.empty(); }
 };
 
-// Messages of several logs in the order of their log times.
+// Time of measurement of a message; kNoTime where it has none that is shown.
+loc::TimeNs measured_ns(const loc::LcmLogEvent& event) {
+  static const std::set<std::int64_t> kStamped = {
+      loc::image_t::getHash(),  loc::estimate_t::getHash(), loc::slam_frame_t::getHash(), loc::map_points_t::getHash(),
+      loc::fusion_t::getHash(), loc::imu_t::getHash(),      loc::gps_fix_t::getHash(),    loc::reference_t::getHash()};
+  constexpr std::size_t kUpToTime = 16;  // these types begin with it
+  if (event.data.size() < kUpToTime || !kStamped.contains(loc::wire::fingerprint(event.data))) return loc::kNoTime;
+  return loc::wire::fingerprint(event.data.subspan(8));
+}
+
+// Messages of several logs in the order of measurement: each log in its own order, of those that come next in the logs
+// the one that was measured first. What has no such time goes with what was before it in its log, as does a message
+// whose stamp is far off.
 class Logs {
  public:
   explicit Logs(const std::vector<std::string>& paths) {
     for (const std::string& path : paths) {
-      logs_.push_back({path, loc::LcmLogReader(path), nullptr});
-      logs_.back().head = logs_.back().reader.next();
+      logs_.push_back({path, loc::LcmLogReader(path), nullptr, {}});
+      // Only two stamps that agree tell where a log begins: the first one may be damaged.
+      loc::LcmLogReader ahead(path);
+      for (const auto* event = ahead.next(); event != nullptr && !logs_.back().guard.confirmed();
+           event = ahead.next()) {
+        see(logs_.back().guard, *event);
+      }
+      advance(logs_.back());
     }
   }
   /// nullptr at the end; valid until the next call.
   const loc::LcmLogEvent* next() {
-    if (last_ != nullptr) last_->head = last_->reader.next();
+    if (last_ != nullptr) advance(*last_);
     last_ = nullptr;
     for (Log& log : logs_) {
-      if (log.head != nullptr && (last_ == nullptr || log.head->log_time_us < last_->head->log_time_us)) last_ = &log;
+      if (log.head != nullptr && (last_ == nullptr || log.guard.newest_ns() < last_->guard.newest_ns())) last_ = &log;
     }
     return last_ == nullptr ? nullptr : last_->head;
   }
+  /// Of the message that came last; kNoTime when none in its log has a time so far.
+  loc::TimeNs time_ns() const { return last_ == nullptr ? loc::kNoTime : last_->guard.newest_ns(); }
   void report_damage() const {
     for (const Log& log : logs_) {
       const loc::LcmLogDamage& damage = log.reader.damage();
@@ -84,7 +115,15 @@ class Logs {
     std::string path;
     loc::LcmLogReader reader;
     const loc::LcmLogEvent* head;
+    loc::StampGuard guard;
   };
+  static void see(loc::StampGuard& guard, const loc::LcmLogEvent& event) {
+    if (const loc::TimeNs time_ns = measured_ns(event); time_ns != loc::kNoTime) guard.judge(time_ns);
+  }
+  static void advance(Log& log) {
+    log.head = log.reader.next();
+    if (log.head != nullptr) see(log.guard, *log.head);
+  }
   std::vector<Log> logs_;
   Log* last_ = nullptr;
 };
@@ -124,8 +163,11 @@ class Output {
   /// One picture of --png-every, named by its time.
   void write_numbered(const loc::Scene3d& scene, double time_s) {
     draw(scene);
-    const auto name = fmt::format("scene-{:010.3f}.png", time_s);
-    write(scene, std::filesystem::path(arguments_.png_folder) / name);
+    const auto name = fmt::format("scene-{:010.3f}", time_s);
+    // Time may come to the same place again, when a source begins anew.
+    const int before = numbered_[name]++;
+    const auto ending = before == 0 ? std::string(".png") : fmt::format("-{}.png", before + 1);
+    write(scene, std::filesystem::path(arguments_.png_folder) / (name + ending));
   }
   void write_last(const loc::Scene3d& scene) {
     if (!arguments_.png.empty()) write(scene, arguments_.png);
@@ -165,27 +207,34 @@ class Output {
 #endif
   loc::LatencyHistogram spent_;
   std::int64_t pictures_ = 0;
+  std::map<std::string, int> numbered_;
 };
 
-// --png-every: due times, counted in measurement time from the first estimate.
+// --png-every: due times, counted in measurement time from the first estimate. Where time steps back they begin anew
+// from there: one stamp that is ahead must not be waited for.
 class Numbered {
  public:
   explicit Numbered(double every_s) : every_ns_(loc::from_seconds(every_s)) {}
   bool due(const loc::SceneRecorder& recorder) {
     if (every_ns_ == 0 || recorder.time_ns() == loc::kNoTime) return false;
-    const loc::TimeNs since = recorder.time_ns() - recorder.first_time_ns();
-    if (since < next_ns_) return false;
-    next_ns_ = (since / every_ns_ + 1) * every_ns_;
-    return true;
+    const loc::TimeNs since = loc::time_between(recorder.first_time_ns(), recorder.time_ns());
+    const bool due = since >= next_ns_;
+    const bool back = since < newest_ns_ || recorder.first_time_ns() != first_ns_;
+    first_ns_ = recorder.first_time_ns();
+    newest_ns_ = since;
+    if (due || back) next_ns_ = (std::max<loc::TimeNs>(since, 0) / every_ns_ + 1) * every_ns_;
+    return due;
   }
 
  private:
   loc::TimeNs every_ns_;
   loc::TimeNs next_ns_ = 0;
+  loc::TimeNs newest_ns_ = 0;
+  loc::TimeNs first_ns_ = loc::kNoTime;
 };
 
 double seconds_of(const loc::SceneRecorder& recorder) {
-  return loc::to_seconds(recorder.time_ns() - recorder.first_time_ns());
+  return loc::to_seconds(loc::time_between(recorder.first_time_ns(), recorder.time_ns()));
 }
 
 int finish(const loc::SceneRecorder& recorder, Output& output, const std::string& source) {
@@ -193,6 +242,8 @@ int finish(const loc::SceneRecorder& recorder, Output& output, const std::string
     if (count.value > 0 &&
         (count.name.starts_with("undecodable:") || count.name.find("skipped") != std::string::npos)) {
       loc::log_warning("event=skipped source=\"{}\" {}={}", source, count.name, count.value);
+    } else if (count.value > 0 && count.name.starts_with("time.")) {
+      loc::log_warning("event=time_unsteady source=\"{}\" {}={}", source, count.name, count.value);
     }
   }
   if (recorder.time_ns() == loc::kNoTime) {
@@ -221,7 +272,7 @@ int show_logs(const Arguments& arguments) {
       interrupted = true;
       break;
     }
-    loc::sleep_for(pacer.wait_ns(event->log_time_us * 1000, loc::steady_now()));
+    if (logs.time_ns() != loc::kNoTime) loc::sleep_for(pacer.wait_ns(logs.time_ns(), loc::steady_now()));
     recorder.take(event->channel, event->data, event->log_time_us * 1000);
     if (arguments.at_given && recorder.time_ns() != loc::kNoTime && seconds_of(recorder) >= arguments.at_s) break;
     if (numbered.due(recorder)) output.write_numbered(recorder.scene(), seconds_of(recorder));
@@ -333,8 +384,10 @@ int main(int argc, char** argv) {
                        "from logs; in a window, or as PNG without a display.");
   CLI::App& app = program.app();
   program.add_lcm_url(arguments.lcm_url);
-  app.add_option("LOG", arguments.logs,
-                 "LCM logs, shown together (estimates in one, pictures in the other); none: live");
+  app.add_option(
+      "LOG", arguments.logs,
+      "LCM logs, shown together in the order of measurement (estimates in one, pictures in the other), whenever "
+      "they were logged; none: live");
   program.add_config(arguments.config)->description("Calibration (rig.yaml): the shape of the camera's frustum");
   loc::add_channel_option(app, arguments.channels);
   app.add_option("--estimate-channel", arguments.recorder.estimate_channel, "Channel of the estimates")

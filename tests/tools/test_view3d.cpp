@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <limits>
 #include <numbers>
 
 #include "libloc/core/check.hpp"
@@ -297,6 +298,13 @@ SceneRecorder recorder_of_ride(double gps_heading = 0.4) {
   return recorder;
 }
 
+std::int64_t find_count(const SceneRecorder& recorder, const std::string& name) {
+  for (const NamedCount& count : recorder.counts()) {
+    if (count.name == name) return count.value;
+  }
+  return 0;
+}
+
 TEST(SceneRecorder, HoldsWhatTheMessagesSay) {
   const SceneRecorder recorder = recorder_of_ride();
   EXPECT_EQ(recorder.time_ns(), kStart + 10 * kSecond);
@@ -402,6 +410,93 @@ TEST(SceneRecorder, RubbishIsCountedAndMemoryBounded) {
   EXPECT_FALSE(recorder.scene().warnings.empty());
 }
 
+TEST(SceneRecorder, FixesWithoutAltitudeAreDrawnAtTheHeightOfTheOthers) {
+  const auto flat_fix = [](double t) {
+    gps_fix_t fix = Ride::fix(t, 0);
+    fix.fix_type = gps_fix_t::FIX_2D;
+    fix.altitude = kUnknown;
+    return fix;
+  };
+  const LocalFrame local(0.7, 0.1, 100);
+  SceneRecorder recorder({});
+  for (int i = 0; i <= 100; ++i) {
+    recorder.take("LOC_ESTIMATE", encode(Ride::estimate(i / 10.0)));
+    if (i % 10 == 0) recorder.take("LOC_GPS", encode(i < 80 ? flat_fix(i / 10.0) : Ride::fix(i / 10.0, 0)));
+  }
+  EXPECT_EQ(recorder.undecodable(), 0);
+  // Laid over the trajectory.
+  Scene3d scene = recorder.scene();
+  ASSERT_EQ(scene.gps.size(), 11U) << scene.gps_note;
+  EXPECT_NEAR((scene.gps[3] - Ride::place(3)).head<2>().norm(), 0, 0.05);
+  EXPECT_NEAR(scene.gps[3].z(), Ride::place(3).z(), 1);
+  EXPECT_EQ(find_count(recorder, "gps.without_altitude"), 8);
+  // Where the world is tied to the Earth: at the height of its origin.
+  fusion_t fusion{};
+  fusion.time_ns = kStart + 10 * kSecond;
+  fusion.scale = fusion.scale_sigma = kUnknown;
+  fusion.origin_latitude = 0.7;
+  fusion.origin_longitude = 0.1;
+  fusion.origin_altitude = 90;
+  recorder.take("LOC_FUSION", encode(fusion));
+  scene = recorder.scene();
+  EXPECT_NEAR((scene.gps[3] - Ride::place(3) - Eigen::Vector3d(300, -50, 0)).head<2>().norm(), 0, 0.01);
+  EXPECT_NEAR(scene.gps[3].z(), 0, 0.1) << "less than the Earth bends away";
+  EXPECT_NEAR(scene.gps[9].z(), Ride::place(9).z() + 4 + 10, 0.01) << "as measured";
+}
+
+TEST(SceneRecorder, AStampThatIsFarOffIsCountedAndNotFollowed) {
+  const auto late = [](double t, TimeNs by) {
+    estimate_t m = Ride::estimate(t);
+    m.time_ns += by;
+    return m;
+  };
+  constexpr TimeNs kYear = 365LL * 86'400 * kSecond;
+  SceneRecorder recorder({});
+  recorder.take("LOC_ESTIMATE", encode(late(0, 20 * kYear)));  // even the first one
+  for (int i = 1; i <= 40; ++i) {
+    recorder.take("LOC_ESTIMATE", encode(Ride::estimate(i / 20.0)));
+    if (i % 10 == 0) {
+      recorder.take("LOC_ESTIMATE", encode(late(i / 20.0, i == 10 ? 3 * kYear : -kYear)));
+      slam_frame_t frame = Ride::frame(i / 20.0, SlamFeatureState::kMeasured, false);
+      frame.time_ns += kYear;
+      recorder.take("LOC_SLAM_FRAME", encode(frame));
+      recorder.take("LOC_ESTIMATE", encode(late(i / 20.0, std::numeric_limits<TimeNs>::max() - kStart - 2 * kSecond)));
+    }
+  }
+  EXPECT_EQ(recorder.first_time_ns(), kStart + kSecond / 20);
+  EXPECT_EQ(recorder.time_ns(), kStart + 2 * kSecond);
+  EXPECT_EQ(recorder.scene().trajectory.size(), 40U);
+  EXPECT_EQ(find_count(recorder, "time.skipped.far_off"), 1 + 4 * 3);
+  // Two that agree: the clock has been set.
+  for (int i = 0; i < 10; ++i) recorder.take("LOC_ESTIMATE", encode(late(3 + i / 20.0, kYear)));
+  EXPECT_EQ(recorder.time_ns(), kStart + kYear + from_seconds(3.45));
+  EXPECT_EQ(find_count(recorder, "time.jumped"), 1);
+}
+
+TEST(SceneRecorder, TwoClocksOnOneChannelStayWithinTheMemory) {
+  SceneRecorderOptions options;
+  options.max_track_points = 100;
+  SceneRecorder recorder(options);
+  for (int i = 0; i < 5000; ++i) {
+    for (const double clock : {0.0, 30.0}) {
+      const double t = i / 20.0 + clock;
+      recorder.take("LOC_ESTIMATE", encode(Ride::estimate(t)));
+      recorder.take("LOC_GPS", encode(Ride::fix(t, 0)));
+      ReferenceMeasurement reference;
+      reference.time_ns = kStart + from_seconds(t);
+      reference.position = Ride::place(t);
+      reference.q_world_body = Eigen::Quaterniond::Identity();
+      recorder.take("LOC_REFERENCE", encode(to_message(reference)));
+    }
+  }
+  const Scene3d scene = recorder.scene();
+  EXPECT_LE(scene.trajectory.size(), 101U);
+  EXPECT_GE(scene.trajectory.size(), 50U);
+  EXPECT_LE(scene.gps.size(), 101U);
+  EXPECT_LE(scene.reference.size(), 101U);
+  EXPECT_EQ(find_count(recorder, "time.stepped_back"), 4999);
+}
+
 class View3d : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -451,6 +546,43 @@ TEST_F(View3d, DrawsLogsWithoutADisplay) {
 
   ASSERT_EQ(view({path("ride.lcm"), "--at", "3", "--png", path("b.png")}), 0);
   EXPECT_NE(errors().find("time_s=3.000"), std::string::npos) << errors();
+}
+
+TEST_F(View3d, OneEstimateYearsAheadDoesNotStopThePictures) {
+  {
+    LcmLogWriter log(path("ahead.lcm"));
+    for (int i = 0; i <= 200; ++i) {
+      estimate_t m = Ride::estimate(i / 20.0);
+      if (i == 50) m.time_ns += 100'000'000 * kSecond;
+      if (i == 120) m.time_ns += 60 * kSecond;  // as it may well be
+      log.write((kStart + from_seconds(i / 20.0)) / 1000, "LOC_ESTIMATE", encode(m));
+    }
+    log.flush();
+  }
+  ASSERT_EQ(view({path("ahead.lcm"), "--png-every", "4", "--png-folder", path("many"), "--size", "64x64"}), 0);
+  EXPECT_NE(errors().find("time.skipped.far_off=1"), std::string::npos) << errors();
+  for (const char* name : {"scene-000000.000.png", "scene-000004.000.png", "scene-000008.000.png"}) {
+    EXPECT_TRUE(std::filesystem::exists(path("many") + "/" + name)) << name;
+  }
+}
+
+TEST_F(View3d, LogsAreReadInTheOrderOfMeasurement) {
+  // The pictures were logged an hour later, when the recording was replayed; the first stamp in their log is damaged.
+  {
+    LcmLogWriter pictures(path("later.lcm"));
+    for (int i = 0; i <= 200; ++i) {
+      image_t m = Ride::picture(i / 20.0);
+      if (i == 0) m.time_ns += 100'000'000 * kSecond;
+      pictures.write((kStart + from_seconds(i / 20.0 + 3600)) / 1000, "LOC_IMAGE", encode(m));
+    }
+    pictures.flush();
+  }
+  for (const auto& [first, second] : {std::pair{"later.lcm", "ride.lcm"}, std::pair{"ride.lcm", "later.lcm"}}) {
+    ASSERT_EQ(view({path(first), path(second), "--at", "3", "--png", path("a.png"), "--size", "640x480"}), 0)
+        << errors();
+    const Eigen::Vector3i shade = colour_at(read_image(path("a.png"), PixelFormat::kBgr), 560, 400);
+    EXPECT_NEAR(shade.x(), 60, 2) << "the picture of that moment, 60";
+  }
 }
 
 TEST_F(View3d, SaysWhatIsWrong) {

@@ -23,7 +23,8 @@ namespace {
 constexpr const char* kEstimatorStatusChannel = "LOC_ESTIMATOR_STATUS";
 constexpr std::size_t kPictures = 8;
 constexpr std::size_t kMaxAnchors = 20'000;
-constexpr TimeNs kStatusHolds = 3'000'000'000;  // it is sent once a second
+constexpr double kStatusHoldsS = 3;             // it is sent once a second
+constexpr TimeNs kMaxSpacing = 60'000'000'000;  // of a track's points
 constexpr TimeNs kPairedWithin = 300'000'000;   // of GPS and reference with the trajectory, on both sides
 
 bool is_used(SlamFeatureState state) {
@@ -59,7 +60,8 @@ Pairs pair_up(const std::vector<TrackPoint>& track, const std::vector<TrackPoint
                                         [](const TrackPoint& q, TimeNs time) { return q.time_ns < time; });
     if (after == trajectory.end() || after == trajectory.begin()) continue;
     const auto before = after - 1;
-    if (after->begins || after->doubtful || after->time_ns - before->time_ns > kPairedWithin) continue;
+    if (after->begins || after->doubtful) continue;
+    if (time_between(before->time_ns, after->time_ns) > kPairedWithin) continue;
     const double share = to_seconds(p.time_ns - before->time_ns) / to_seconds(after->time_ns - before->time_ns);
     out.track.push_back(p.position);
     out.trajectory.push_back(before->position + share * (after->position - before->position));
@@ -82,19 +84,23 @@ std::optional<Alignment> lay_over(const std::vector<TrackPoint>& track, const st
 void SceneRecorder::Track::add(const TrackPoint& point, std::size_t max_points) {
   TrackPoint added = point;
   if (!points.empty()) {
-    const TimeNs step = point.time_ns - points.back().time_ns;
+    const TimeNs step = time_between(points.back().time_ns, point.time_ns);
     if (step < 0) added.begins = true;
     if (!added.begins && !(added.doubtful && !points.back().doubtful) && step < spacing_ns) return;
   }
   points.push_back(added);
   if (points.size() <= max_points) return;
+  // Every second one, whatever it is: stamps of two sources that take turns begin anew with every point.
   std::size_t kept = 0;
+  bool begins = false;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const bool keep = i % 2 == 0 || points[i].begins || i + 1 == points.size();
-    if (keep) points[kept++] = points[i];
+    begins = begins || points[i].begins;
+    if (i % 2 != 0 && i + 1 != points.size()) continue;
+    points[kept] = points[i];
+    points[kept++].begins = std::exchange(begins, false);
   }
   points.resize(kept);
-  spacing_ns *= 2;
+  spacing_ns = std::min(2 * spacing_ns, kMaxSpacing);
 }
 
 SceneRecorder::SceneRecorder(SceneRecorderOptions options) : options_(std::move(options)), decoder_(options_.decode) {
@@ -133,6 +139,26 @@ std::vector<std::string> SceneRecorder::channels() const {
   return out;
 }
 
+// False for a message that is to be left out.
+bool SceneRecorder::follow(TimeNs time_ns) {
+  switch (guard_.judge(time_ns)) {
+    case StampGuard::Verdict::kGood:
+      return true;
+    case StampGuard::Verdict::kInstead:
+      ++counts_["time.skipped.far_off"];
+      trajectory_.points.clear();
+      time_ns_ = first_time_ns_ = kNoTime;
+      return true;
+    case StampGuard::Verdict::kJumped:
+      ++counts_["time.jumped"];
+      return true;
+    case StampGuard::Verdict::kFarOff:
+      break;
+  }
+  ++counts_["time.skipped.far_off"];
+  return false;
+}
+
 void SceneRecorder::advance(TimeNs time_ns) {
   time_ns_ = time_ns;
   if (first_time_ns_ == kNoTime) first_time_ns_ = time_ns;
@@ -140,14 +166,19 @@ void SceneRecorder::advance(TimeNs time_ns) {
 
 void SceneRecorder::take_estimate(std::span<const std::uint8_t> data) {
   const auto message = decode_message<estimate_t>(data);
-  const Estimate before = std::exchange(estimate_, from_message(message));
+  Estimate newest = from_message(message);
+  ++counts_["estimates"];
+  if (!follow(newest.time_ns)) return;
+  const Estimate before = std::exchange(estimate_, std::move(newest));
+  if (time_ns_ != kNoTime && before.time_ns != kNoTime && estimate_.time_ns < before.time_ns) {
+    ++counts_["time.stepped_back"];
+  }
   pose_before_.reset();
   if ((before.valid & kValidPosition) != 0 && before.q_world_body.coeffs().allFinite() && before.position.allFinite()) {
     pose_before_ = Pose3{before.q_world_body, before.position};
   }
   unknown_scale_before_ = (before.status & kScaleUnknown) != 0;
   method_ = message.method;
-  ++counts_["estimates"];
   advance(estimate_.time_ns);
   if ((estimate_.valid & kValidPosition) == 0 || !estimate_.position.allFinite()) return;
   trajectory_.add({estimate_.time_ns, estimate_.position, (estimate_.status & kReinitialised) != 0,
@@ -185,6 +216,7 @@ void SceneRecorder::move_into_world(const Pose3& T_world_map) {
 void SceneRecorder::take_frame(std::span<const std::uint8_t> data) {
   SlamFrame frame = from_message(decode_message<slam_frame_t>(data));
   ++counts_["frames"];
+  if (!follow(frame.estimate.time_ns)) return;
   for (const SlamFeature& feature : frame.features) {
     if (feature.converted) {
       anchors_.erase(feature.id);
@@ -244,10 +276,16 @@ void SceneRecorder::take_measurement(std::string_view channel, std::span<const s
 
 void SceneRecorder::take_gps(const GpsMeasurement& fix) {
   if (fix.fix < GpsFixType::k2d) return;
-  const GeodeticPoint place{fix.latitude, fix.longitude, fix.altitude};
-  gps_.add({fix.time_ns, earth_from_geodetic(place), false, false}, options_.max_track_points);
+  const bool flat = !std::isfinite(fix.altitude);
+  GeodeticPoint{fix.latitude, fix.longitude, flat ? 0 : fix.altitude}.check();
+  gps_.add({fix.time_ns, {fix.latitude, fix.longitude, flat ? kUnknown : fix.altitude}, false, false},
+           options_.max_track_points);
   ++counts_["gps"];
-  if (!first_fix_) first_fix_ = place;
+  if (flat) {
+    ++counts_["gps.without_altitude"];
+  } else if (!first_altitude_) {
+    first_altitude_ = fix.altitude;
+  }
 }
 
 Scene3d SceneRecorder::scene() const {
@@ -322,12 +360,17 @@ void SceneRecorder::add_reference(Scene3d& scene) const {
 }
 
 void SceneRecorder::add_gps(Scene3d& scene) const {
-  if (gps_.points.empty() || !first_fix_) return;
-  const GeodeticPoint zero = origin_.value_or(*first_fix_);
+  if (gps_.points.empty()) return;
+  const double height = origin_ ? origin_->altitude : first_altitude_.value_or(0);
+  const Eigen::Vector3d& first = gps_.points.front().position;
+  const GeodeticPoint zero = origin_.value_or(GeodeticPoint{first.x(), first.y(), height});
   const Eigen::Matrix3d R_local_earth = R_earth_enu(zero).transpose();
   const Eigen::Vector3d zero_in_earth = earth_from_geodetic(zero);
   std::vector<TrackPoint> local = gps_.points;
-  for (TrackPoint& p : local) p.position = R_local_earth * (p.position - zero_in_earth);
+  for (TrackPoint& p : local) {
+    const double altitude = std::isfinite(p.position.z()) ? p.position.z() : height;
+    p.position = R_local_earth * (earth_from_geodetic({p.position.x(), p.position.y(), altitude}) - zero_in_earth);
+  }
   if (origin_) {
     scene.gps_note = "as measured";
     for (const TrackPoint& p : local) scene.gps.push_back(p.position);
@@ -365,7 +408,7 @@ void SceneRecorder::add_text(Scene3d& scene) const {
     scene.lines.emplace_back("no estimate yet");
     return;
   }
-  scene.lines.push_back(fmt::format("t = {:.2f} s  {}", to_seconds(time_ns_ - first_time_ns_), method_));
+  scene.lines.push_back(fmt::format("t = {:.2f} s  {}", to_seconds(time_between(first_time_ns_, time_ns_)), method_));
   const char* unit = scene.metric ? "m" : "units";
   if (scene.position_cov.allFinite()) {
     scene.lines.push_back(
@@ -379,7 +422,8 @@ void SceneRecorder::add_text(Scene3d& scene) const {
     }
   }
   if (!scene.metric) scene.lines.emplace_back("scale unknown: lengths in a unit of their own");
-  const bool status_holds = conditions_time_ns_ != kNoTime && std::abs(time_ns_ - conditions_time_ns_) < kStatusHolds;
+  const bool status_holds = conditions_time_ns_ != kNoTime &&
+                            std::abs(to_seconds(time_between(conditions_time_ns_, time_ns_))) < kStatusHoldsS;
   std::vector<std::string> words = status_holds ? conditions_ : warnings_of(estimate_.status);
   scene.warnings.insert(scene.warnings.begin(), words.begin(), words.end());
 }

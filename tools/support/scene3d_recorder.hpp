@@ -1,6 +1,8 @@
 // From the messages of a live session or of a log to what the 3-D viewer shows: a SceneRecorder takes messages as they
-// come and says at any moment what the scene is. Its memory is bounded: long tracks are thinned out.
-// Where the estimates are tied to the Earth (fusion_t), GPS fixes are drawn where they are. Otherwise they, and the
+// come and says at any moment what the scene is. Its memory is bounded: long tracks are thinned out. Estimates and
+// frames whose stamps are far off are counted and left out (stamp_guard.hpp).
+// Where the estimates are tied to the Earth (fusion_t), GPS fixes are drawn where they are; those without altitude at
+// that of the origin, or else of the first fix that has one. Otherwise they, and the
 // reference always (its world is another one), are laid over the trajectory: turned about the vertical and shifted,
 // with a scale when the estimator does not know metres. Once GPS has tied a map to the Earth, estimates are in another
 // world than before: what is older is taken there by the two poses around that moment, or left out without metres.
@@ -18,6 +20,7 @@
 #include "libloc/sensors/rig.hpp"
 #include "msgs/decode.hpp"
 #include "tools/support/scene3d.hpp"
+#include "tools/support/stamp_guard.hpp"
 
 namespace loc {
 
@@ -47,7 +50,9 @@ class SceneRecorder {
   /// over each other: milliseconds.
   Scene3d scene() const;
 
-  /// {"estimates", 200}, {"frames", 20}, …, {"undecodable:LOC_IMAGE", 1}, and what the decoder skipped.
+  /// {"estimates", 200}, {"frames", 20}, …, {"undecodable:LOC_IMAGE", 1}, {"time.skipped.far_off", 1},
+  /// {"time.jumped", 1} (followed to another clock), {"time.stepped_back", 1} (of estimates), and what the decoder
+  /// skipped.
   NamedCounts counts() const;
   std::int64_t undecodable() const;
 
@@ -69,6 +74,7 @@ class SceneRecorder {
   void take_map(std::span<const std::uint8_t> data);
   void take_measurement(std::string_view channel, std::span<const std::uint8_t> data, TimeNs receive_time_ns);
   void take_gps(const GpsMeasurement& fix);
+  bool follow(TimeNs time_ns);
   void advance(TimeNs time_ns);
   void add_points(Scene3d& scene) const;
   void add_reference(Scene3d& scene) const;
@@ -78,6 +84,7 @@ class SceneRecorder {
 
   SceneRecorderOptions options_;
   MeasurementDecoder decoder_;
+  StampGuard guard_;
   TimeNs time_ns_ = kNoTime;
   TimeNs first_time_ns_ = kNoTime;
   Estimate estimate_;
@@ -94,8 +101,8 @@ class SceneRecorder {
   TimeNs conditions_time_ns_ = kNoTime;
   Track trajectory_;
   Track reference_;
-  Track gps_;  // in the Earth's axes
-  std::optional<GeodeticPoint> first_fix_;
+  Track gps_;  // latitude, longitude [rad], altitude [m] or NaN
+  std::optional<double> first_altitude_;
   std::map<std::string, std::int64_t> counts_;
 };
 
