@@ -1,15 +1,33 @@
 """loc-view: which messages are taken, from logs and live, and what is counted of the others."""
 
+import threading
+import tracemalloc
+from collections import Counter
+
 import lcm
 import loc
+import numpy as np
 import pytest
 
 import libloc
+from libloc import lcm_receiver
 
 pytest.importorskip("rerun", reason="needs rerun-sdk")
 
-from libloc.view import live, pictures, receiver
-from view_support import NAN, OFFSET_NS, START, drawn, estimate, frame, image, messages, ride_log, where
+from libloc.view import intake, logs, matching, pictures, receiver
+from view_support import (
+    NAN,
+    OFFSET_NS,
+    START,
+    drawn,
+    estimate,
+    frame,
+    image,
+    messages,
+    ride_log,
+    where,
+    write,
+)
 
 
 @pytest.fixture
@@ -67,10 +85,90 @@ def test_part_of_a_log(ride):
     assert min(t for _, t, _ in stream.logged if t is not None) >= START + 200_000_000
 
 
+def test_an_absurd_stamp_comes_first(tmp_path):
+    """Neither the first one nor any other is trusted alone."""
+    events = messages()
+    absurd = [("LOC_ESTIMATE", estimate(START + k * 10**17, 0, where(0))) for k in (3, -3)]
+    _, counts = drawn(write(tmp_path / "first.log", [absurd[0], *events[:50], absurd[1], *events[50:]]))
+    assert counts["LOC_ESTIMATE.absurd_time"] == 2
+    assert counts["pictures.drawn"] == 10
+    assert counts["time.jumped"] == 0
+    _, counts = drawn(write(tmp_path / "one.log", [("LOC_ESTIMATE", estimate(START, 0, where(0)))]))
+    assert counts["estimates.drawn"] == 1  # nothing contradicts it
+
+    # Two that agree: the clock was set. Live, what came first waits for the second.
+    taken = intake.Intake(intake.channels_of([]))
+    stamps = [START, START + 1, START + 10**17, START + 2, START + 10**17, START + 10**17 + 1]
+    out = [taken.take("LOC_ESTIMATE", estimate(t, 0, where(0)).encode()) for t in stamps]
+    assert [len(items) for items in out] == [0, 2, 0, 1, 0, 1]
+    assert taken.counts["time.jumped"] == 1
+    assert taken.counts["LOC_ESTIMATE.absurd_time"] == 2
+    assert taken.rest() == []
+
+
+def test_the_time_of_a_status_is_checked(tmp_path):
+    status = loc.estimator_status_t()
+    status.measurement_time_ns, status.method = START + 3 * 10**17, "inertial-slam"
+    status.size, status.condition, status.since_s = 1, ["lost"], [0.0]
+    events = [("LOC_ESTIMATE", estimate(START + i * 10**7, i, where(0))) for i in range(10)]
+    stream, counts = drawn(write(tmp_path / "x.log", [*events, ("LOC_ESTIMATOR_STATUS", status)]))
+    assert [t for t, _ in stream.of("messages")] == [START + 9 * 10**7]  # where the measurements are
+    assert counts["LOC_ESTIMATOR_STATUS.absurd_time"] == 1
+
+
+def test_several_logs_are_read_in_the_order_of_measurement(tmp_path):
+    """Whichever comes first, whenever they were logged: frames find their pictures, and few are kept."""
+    seen = [("LOC_IMAGE", image(START + i * 10**8 - OFFSET_NS, i)) for i in range(700)]
+    made = [("LOC_SLAM_FRAME", frame(START + i * 10**8, i)) for i in range(700)]
+    seen[0][1].time_ns += 10**18  # damaged
+    first, second = write(tmp_path / "seen.log", seen), write(tmp_path / "made.log", made)
+    for paths in ([first, second], [second, first]):
+        _, counts = drawn(*paths)
+        assert counts["frames.drawn"] == 700
+        assert counts["pictures.drawn"] == 699
+        assert counts["frames.without_picture"] == counts["LOC_IMAGE.absurd_time"] == 1
+        assert counts["pictures.without_frame"] == 0
+
+
+def test_the_memory_does_not_grow_with_the_log(tmp_path):
+    def peak(seconds):
+        m = frame(START, 0)
+        m.size = 100
+        for name in m.__slots__:
+            value = getattr(m, name)
+            if isinstance(value, list) and len(value) == 3 and name != "camera_position":
+                setattr(m, name, [value[0]] * 100)
+
+        def events():
+            for i in range(10 * seconds):
+                m.time_ns, m.sequence = START + i * 10**8, i
+                yield "LOC_SLAM_FRAME", m
+
+        path = write(tmp_path / f"{seconds}.log", events())
+        tracemalloc.start()
+        try:
+            found = logs.survey([path], intake.Intake(intake.channels_of([])), 0, logs.Window(), Counter())
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+            assert found.frames == 10 * seconds
+
+    assert peak(40) < peak(10) + 500_000
+
+    way = logs.Way(most=100)
+    for i in range(1001):
+        way.add(START + i, (i, 2 * i, 3 * i))
+    assert 50 <= len(way) <= 101
+    assert way.thinned == 1001 - len(way)
+    steps = np.diff(way.times_ns)
+    assert (steps == steps[0]).all()
+    np.testing.assert_array_equal(way.positions[:, 1], 2 * (way.times_ns - START))
+
+
 # ---- live, without a network
 def test_pictures_and_frames_meet_in_any_order():
     met = []
-    matcher = live.LivePictures(lambda m, f: met.append((m and m.sequence, f and f.sequence)), OFFSET_NS)
+    matcher = matching.Matcher(lambda m, f: met.append((m and m.sequence, f and f.sequence)), OFFSET_NS)
 
     def picture(i, now_s=0.0):
         matcher.picture(image(START + i * 10**8 - OFFSET_NS, i), now_s)
@@ -109,7 +207,7 @@ def test_pictures_and_frames_meet_in_any_order():
 
     # Where nothing finds features, only the first picture waits.
     met.clear()
-    matcher = live.LivePictures(lambda m, f: met.append((m and m.sequence, f and f.sequence)), 0)
+    matcher = matching.Matcher(lambda m, f: met.append((m and m.sequence, f and f.sequence)), 0)
     picture(1)
     matcher.give_up(0.1)
     assert met == []
@@ -129,3 +227,33 @@ def test_newest_pictures_win():
     assert len([data for channel, data in taken if channel == "LOC_ESTIMATE"]) == 10
     assert r.counts == {"pictures.dropped": 6}
     assert r.take(0) == []
+
+
+def test_a_lost_connection_is_counted_once(monkeypatch):
+    """However often it is tried anew."""
+    attempts = []
+
+    class Connection:
+        def __init__(self, url):
+            attempts.append(url)
+            if 1 < len(attempts) < 4:
+                raise RuntimeError("no hub")
+            self.fails = len(attempts) in (1, 4)  # that one is no good either
+
+        def subscribe(self, channel, handler):
+            self.handler = handler
+
+        def handle_timeout(self, ms):
+            if self.fails:
+                raise OSError("connection lost")
+            self.handler("LOC_ESTIMATE", b"data")
+            came.set()
+
+    came = threading.Event()
+    monkeypatch.setattr(lcm_receiver.lcm, "LCM", Connection)
+    monkeypatch.setattr(lcm_receiver, "_RETRY_S", 0.01)
+    with receiver.Receiver("tcpq://somewhere", ["LOC_ESTIMATE"], "LOC_IMAGE") as r:
+        assert came.wait(10)
+    assert len(attempts) == 5
+    assert r.take(0)[0] == ("LOC_ESTIMATE", b"data")
+    assert r.counts["connections.lost"] == 1

@@ -193,12 +193,12 @@ def values(batch):
     return np.array(batch.as_arrow_array().to_pylist(), dtype=float)
 
 
-def drawn(path, align="auto", **options):
-    """Stream, counts of a log that was drawn into it."""
+def drawn(*paths, align="auto", **options):
+    """Stream, counts of logs that were drawn into it."""
     import rerun as rr
 
     stream, channels, window = Stream(), intake.channels_of([]), logs.Window(**options)
-    found = logs.survey([path], intake.Intake(channels), 0, window, counts := Counter())
+    found = logs.survey(paths, intake.Intake(channels), 0, window, counts := Counter())
     out = Recorder(rr, stream, found.start_ns)
     scene = Scene(
         out,
@@ -209,5 +209,5 @@ def drawn(path, align="auto", **options):
     )
     scene.space.align, _ = logs.alignment(found, align)
     taken = intake.Intake(channels)
-    logs.draw([path], taken, found, window, scene)
+    logs.draw(paths, taken, found, window, scene)
     return stream, scene.counts + taken.counts + counts

@@ -10,22 +10,20 @@ from __future__ import annotations
 import argparse
 import os
 import queue
-import re
 import sys
-import threading
 import time
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
 
-import lcm
 import loc
 import numpy as np
 from numpy.typing import NDArray
 
 import libloc
 from libloc import DataError
+from libloc.lcm_receiver import LcmReceiver
 from libloc.programs import calibrate_plots as plots
 from libloc.programs.calibrate_input import SI, Readings, Triad
 
@@ -64,60 +62,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="give up when no reading came for this long [s] (%(default)s)",
     )
-
-
-class Receiver:
-    """Hands messages over from a thread of its own, so that drawing loses none.
-
-    Connects anew when the hub goes away.
-    """
-
-    def __init__(self, url: str, channels: list[str]) -> None:
-        self._url, self._channels = url, channels
-        self._queue: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
-        self._stop = threading.Event()
-        self.connections_lost = 0
-        try:
-            self._lcm = self._connect()
-        except (RuntimeError, OSError) as error:
-            raise DataError(
-                f"cannot connect to {url}: {error} (tcpq needs loc-hub running there; udpm a route for "
-                "multicast)"
-            ) from None
-        self._thread = threading.Thread(target=self._run, daemon=True)
-
-    def __enter__(self) -> Receiver:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stop.set()
-        self._thread.join()
-
-    def get(self, timeout_s: float) -> tuple[str, bytes] | None:
-        try:
-            return self._queue.get(timeout=timeout_s)
-        except queue.Empty:
-            return None
-
-    def _connect(self) -> Any:
-        connection = lcm.LCM(self._url)
-        for channel in self._channels:
-            # A channel is subscribed to as a regular expression; its name is meant literally.
-            connection.subscribe(re.escape(channel), lambda name, data: self._queue.put((name, bytes(data))))
-        return connection
-
-    def _run(self) -> None:
-        while not self._stop.is_set():
-            try:
-                self._lcm.handle_timeout(50)
-            except (RuntimeError, OSError):
-                self.connections_lost += 1
-                self._stop.wait(0.5)
-                try:
-                    self._lcm = self._connect()
-                except (RuntimeError, OSError):
-                    continue  # whoever waits for readings gives up when its patience ends
 
 
 @dataclass
@@ -261,9 +205,14 @@ def collect(options: argparse.Namespace, stream: TextIO | None = None) -> Readin
     next_evaluation, next_picture = start + _EVALUATE_S, start + _PICTURE_S
     enough, why = 0, "the time given with --duration is over"
     channels = [options.channel, options.imu_channel, libloc.SOURCE_STATUS_CHANNEL]
-    with Receiver(options.lcm_url, channels) as receiver:
+    # A queue, so that drawing loses none.
+    messages: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
+    with LcmReceiver(options.lcm_url, channels, lambda *message: messages.put(message)) as receiver:
         while time.monotonic() - start < options.duration:
-            message = receiver.get(0.05)
+            try:
+                message = messages.get(timeout=0.05)
+            except queue.Empty:
+                message = None
             now = time.monotonic()
             if message is not None and collection.take(*message, options):
                 last_reading = now

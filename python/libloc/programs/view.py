@@ -220,8 +220,8 @@ def _show_logs(rr: Any, options: argparse.Namespace, camera: Any | None, interru
     seen = logs.extent(found)
     align, sentence = logs.alignment(found, options.align)
     layout = Layout(
-        picture_px=found.picture_px, has_pictures=found.pictures > 0 or len(found.frames) > 0,
-        has_frames=len(found.frames) > 0, has_latency=found.has_latency, hide_local=found.became_tied,
+        picture_px=found.picture_px, has_pictures=found.pictures > 0 or found.frames > 0,
+        has_frames=found.frames > 0, has_latency=found.has_latency, hide_local=found.became_tied,
         in_frustum=camera is not None,
     )  # fmt: skip
     axis_m = _AXIS_M
@@ -268,10 +268,7 @@ def _show_live(rr: Any, options: argparse.Namespace, camera: Any | None, interru
             at_end = options.exit_at_end and drawing.ended and now - result_came > _END_S
             if now - began > options.duration or at_end:
                 break
-            for channel, data in receiver.take(0.02):
-                item = intake.take(channel, data)
-                if item is None:
-                    continue
+            for item in (item for event in receiver.take(0.02) for item in intake.take(*event)):
                 heard = now
                 if item.stream in _RESULTS:
                     result_came = now
@@ -285,6 +282,8 @@ def _show_live(rr: Any, options: argparse.Namespace, camera: Any | None, interru
                 _say(f"nothing has come on {options.lcm_url} for {_SILENCE_S:g} s")
         if target.viewer is not None and not target.viewer.running:
             _say("the viewer has ended")
+        for item in intake.rest():
+            drawing.take(item, time.monotonic())
         drawing.finish()
         _whole(layout, scene)
         target.stream.send_blueprint(blueprint(rr, layout))
