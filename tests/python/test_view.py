@@ -204,12 +204,110 @@ def test_a_full_disk(tmp_path, monkeypatch, capsys):
             return getattr(rr, name)
 
     made = target.Target(Module(), tmp_path / "x.rrd", None, (800, 600), None)
-    with pytest.raises(output.ViewerError, match=r"x\.part\.rrd: .*is the disk full"), made:
+    (tmp_path / "x.part.rrd").write_text("of another run")
+    with pytest.raises(output.ViewerError, match=r"x\.\d+\.part\.rrd: .*is the disk full"), made:
         made.keep_part = True
         made.stream.log("here", rr.TextLog("there"))
         made.check(time.monotonic())
-    assert [one.name for one in tmp_path.iterdir()] == ["x.part.rrd"]
-    assert rows_of(tmp_path / "x.part.rrd")["/here"] == 1
+    part = tmp_path / f"x.{os.getpid()}.part.rrd"
+    assert set(tmp_path.iterdir()) == {part, tmp_path / "x.part.rrd"}
+    assert made.kept == part
+    assert rows_of(part)["/here"] == 1
+
+
+def test_two_write_one_file(tmp_path):
+    """Each has a file of its own until it is whole; that of the other is not replaced unasked."""
+    path = tmp_path / "x.rrd"
+    with target.Target(rr, path, None, (800, 600), None) as one:
+        one.stream.log("one", rr.TextLog("1"))
+        with target.Target(rr, path, None, (800, 600), None) as two:
+            two.stream.log("two", rr.TextLog("2"))
+            assert len(list(tmp_path.glob("x.*.part.rrd"))) == 2
+            two.finish()
+        with pytest.raises(output.ViewerError, match="another program has written it"):
+            one.finish()
+    assert rows_of(path)["/two"] == 1
+    assert rows_of(one.kept)["/one"] == 1
+    one.kept.unlink()
+    with pytest.raises(KeyError), target.Target(rr, path, None, (800, 600), None):
+        raise KeyError
+    with target.Target(rr, path, None, (800, 600), None, overwrite=True) as one:
+        one.stream.log("one", rr.TextLog("1"))
+        one.finish()
+    assert "/one" in rows_of(path)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_requests_to_end(monkeypatch):
+    before = signal.getsignal(signal.SIGHUP)
+    with target.Interrupt() as interrupt:
+        assert not interrupt.asked
+        signal.raise_signal(signal.SIGHUP)
+        assert interrupt.asked
+    assert signal.getsignal(signal.SIGHUP) == before
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as under nohup
+    try:
+        with target.Interrupt() as interrupt:
+            signal.raise_signal(signal.SIGHUP)
+            assert not interrupt.asked
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.slow
+def test_the_end_of_the_source_and_a_viewer_that_was_closed(tmp_path):
+    """Live: either ends it, and the file is whole."""
+    ended, closed = tmp_path / "ended.rrd", tmp_path / "closed.rrd"
+    ports = "--web-port", output.free_port(), "--data-port", output.free_port()
+    with (
+        hub() as url,
+        started("--lcm-url", url, "--save", ended, "--exit-at-end") as first,
+        started("--lcm-url", url, "--save", closed, "--web", *ports) as second,
+    ):
+        wait_for(first, "listening")
+        wait_for(second, "listening")
+        time.sleep(0.2)
+        connection = lcm.LCM(url)
+        for channel, m in messages(0.3):
+            connection.publish(channel, m.encode())
+        status = loc.source_status_t()
+        status.source, status.state = "here", status.STATE_ENDED
+        connection.publish("LOC_SOURCE_STATUS", status.encode())
+        out, errors = first.communicate(timeout=30)
+        assert first.returncode == 0, errors
+        assert "LOC_ESTIMATE.received = 60" in out
+        assert second.poll() is None  # it was not asked to
+        viewers = [pid for pid in children_of(second.pid) if "--serve-web" in command_of(pid)]
+        assert viewers
+        for pid in viewers:
+            os.kill(pid, signal.SIGKILL)
+        out, errors = second.communicate(timeout=30)
+        assert second.returncode == 0, errors
+        assert "the viewer has ended" in errors
+    for path in (ended, closed):
+        assert rows_of(path)["/plots/reprojection"] == 3 + 1
+    assert set(tmp_path.iterdir()) == {ended, closed}
+
+
+def children_of(pid):
+    """With theirs."""
+    out = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            parent = int(stat.read_text().rsplit(")", 1)[1].split()[1])
+        except OSError:
+            continue  # it has ended
+        if parent == pid:
+            child = int(stat.parent.name)
+            out += [child, *children_of(child)]
+    return out
+
+
+def command_of(pid):
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text().split("\0")
+    except OSError:
+        return []
 
 
 def test_nothing_to_hear(tmp_path, capsys):
@@ -247,11 +345,12 @@ def test_in_the_browser_of_this_machine_alone(ride, tmp_path, monkeypatch):
         page = re.search(r"open (http://127\.0\.0\.1:(\d+)\?url=\S+)", text)
         forwards = re.search(r"ssh -L (\d+):127\.0\.0\.1:\1 -L (\d+):127\.0\.0\.1:\2 ", text)
         assert page and forwards and page[2] == forwards[1]
-        with urllib.request.urlopen(page[1], timeout=10) as answer:
+        direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # whatever http_proxy says
+        with direct.open(page[1], timeout=10) as answer:
             assert b"<html" in answer.read().lower()
         for port in forwards.groups():
             assert listening_addresses(int(port)) == {"0100007F"}
-        process.send_signal(signal.SIGINT)
+        process.send_signal(signal.SIGHUP)  # the terminal was closed
         _, errors = process.communicate(timeout=30)
         assert process.returncode == 0, errors
         for port in forwards.groups():
@@ -271,3 +370,30 @@ def test_screenshot(ride, rig, tmp_path, capsys):
     assert picture.shape[:2] == (600, 800)
     # The grey of the picture's pixels, on the left.
     assert (np.abs(picture[:, :400] - 128).max(axis=2) < 12).mean() > 0.1
+
+
+@pytest.mark.slow
+def test_a_live_screenshot_needs_no_room_on_the_disk(tmp_path):
+    try:
+        output.check_screenshots()
+    except output.ViewerError as error:
+        pytest.skip(str(error))
+    path = tmp_path / "x.png"
+    with hub() as url, started("--lcm-url", url, "--screenshot", path, "--size", "800x600") as process:
+        wait_for(process, "listening")
+        time.sleep(0.2)
+        connection = lcm.LCM(url)
+        for channel, m in messages():
+            connection.publish(channel, m.encode())
+            if channel == "LOC_IMAGE":
+                time.sleep(0.02)
+        time.sleep(0.3)
+        held = {os.path.realpath(link) for link in Path(f"/proc/{process.pid}/fd").iterdir()}
+        assert not [name for name in held if name.endswith(".rrd")]
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode == 0, errors
+    picture = np.array(Image.open(path).convert("RGB")).astype(int)
+    assert picture.shape[:2] == (600, 800)
+    assert (np.abs(picture[:, :400] - 128).max(axis=2) < 12).mean() > 0.1
+    assert list(tmp_path.iterdir()) == [path]

@@ -18,8 +18,9 @@ measurements are by then.
 
 Of estimates --rate-hz a second are drawn; status flags, latency (the worst) and the numbers of each frame
 are complete. A flag is shown for at least 0.2 s. Live, pictures give way to newer ones when drawing is too
-slow, all else is drawn; how many gave way is told. Messages that cannot be used are counted and told at the
-end.
+slow, all else is drawn; how many gave way is told. Several logs are read together in the order of
+measurement, whenever they were logged. Messages that cannot be used are counted and told at the end, also
+those whose stamps are a day or more off, unless two in a row agree.
 
 Viewers listen on 127.0.0.1 only. Exit codes: 0 done (live: also by Ctrl-C), 1 the data cannot be used or the
 viewer failed (the message says why), 2 wrong options, 130 interrupted: what was drawn by then is written.
@@ -33,6 +34,8 @@ import re
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -167,8 +170,8 @@ def make_parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     group.add_argument(
         "--memory", type=_memory, default="1GB", metavar="SIZE",
-        help="what is kept for a browser that comes later, or used by the window; the oldest goes first "
-        "(%(default)s)",
+        help="what is kept for a browser that comes later, or live for a screenshot without --save, or used "
+        "by the window; the oldest goes first (%(default)s)",
     )  # fmt: skip
     group.add_argument("--overwrite", action="store_true", help="replace files of an earlier run")
     return parser
@@ -191,7 +194,22 @@ def _camera_of(options: argparse.Namespace) -> Any | None:
 def _target(rr: Any, options: argparse.Namespace) -> Target:
     kind = "web" if options.web else "window" if options.spawn else None
     viewer = None if kind is None else ViewerPlan(kind, options.memory, options.web_port, options.data_port)
-    return Target(rr, options.save, options.screenshot, options.size, viewer)
+    # Nobody knows how long a live session gets.
+    buffer = None if options.log else options.memory
+    return Target(
+        rr, options.save, options.screenshot, options.size, viewer, overwrite=options.overwrite, buffer=buffer
+    )
+
+
+@contextmanager
+def _opened(target: Target) -> Iterator[Target]:
+    """Tells what is left when it fails."""
+    try:
+        with target:
+            yield target
+    finally:
+        if target.kept is not None:
+            _say(f"what was drawn by then is in {target.kept}")
 
 
 def _finish(target: Target) -> None:
@@ -228,7 +246,7 @@ def _show_logs(rr: Any, options: argparse.Namespace, camera: Any | None, interru
     if seen is not None:
         layout.centre, layout.radius = seen
         axis_m = 0.07 * layout.radius
-    with _target(rr, options) as target:
+    with _opened(_target(rr, options)) as target:
         target.stream.send_blueprint(blueprint(rr, layout))
         scene = _scene(Recorder(rr, target.stream, found.start_ns), camera, options, axis_m)
         scene.space.align = align
@@ -252,7 +270,10 @@ def _show_live(rr: Any, options: argparse.Namespace, camera: Any | None, interru
     channels = channels_of(options.channel)
     intake = Intake(channels)
     picture_channel = next(name for name, stream in channels.items() if stream == "image")
-    with Receiver(options.lcm_url, channels, picture_channel) as receiver, _target(rr, options) as target:
+    with (
+        Receiver(options.lcm_url, channels, picture_channel) as receiver,
+        _opened(_target(rr, options)) as target,
+    ):
         if target.viewer is not None and options.web:
             print(target.viewer.how_to_reach(), flush=True)
         scene = _scene(Recorder(rr, target.stream), camera, options, _AXIS_M)

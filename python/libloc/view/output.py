@@ -70,10 +70,11 @@ def check_screenshots() -> None:
         )
 
 
-def screenshot(recording: Path, picture: Path, size: tuple[int, int]) -> list[str]:
-    """Draws the end of an .rrd file off screen into a .png, and returns what the views complained of.
+def screenshot(recording: Path | str, picture: Path, size: tuple[int, int]) -> list[str]:
+    """Draws the end of a recording off screen into a .png, and returns what the views complained of.
 
-    Raises ViewerError when the recording was not loaded, or is still changing on the screen after a minute.
+    recording: an .rrd file, or the data_url of a viewer of kind "buffer". Raises ViewerError when it was not
+    loaded, or is still changing on the screen after a minute.
     """
     check_screenshots()
     from rerun.experimental import ViewerClient
@@ -81,23 +82,33 @@ def screenshot(recording: Path, picture: Path, size: tuple[int, int]) -> list[st
     with Viewer("headless", "75%", size=size) as viewer:
         try:
             client = ViewerClient.connect(viewer.data_url)
-            opened = client.open(os.fspath(recording.absolute()))
             end = time.monotonic() + _SCREENSHOT_S
-            while opened.store_ids and client.get_state().loading and time.monotonic() < end:
+            in_file = isinstance(recording, Path)
+            opened = client.open(
+                os.fspath(recording.absolute()) if isinstance(recording, Path) else recording
+            )
+            # Of a buffer nobody knows when it has come to its end.
+            while time.monotonic() < end and (opened.store_ids or not in_file):
+                state = client.get_state()
+                if state.active_recording is not None and not state.loading:
+                    break
                 time.sleep(0.1)
             state = client.get_state()
-            if not opened.store_ids or state.active_recording is None or state.loading:
+            if (in_file and not opened.store_ids) or state.active_recording is None or state.loading:
                 raise ViewerError(f"no screenshot: the viewer has not loaded {recording}")
             client.set_time(TIMELINE, play_state="following")
-            shot, before = client.take_screenshot(), b""
-            while shot != before:  # until the views have found their ranges
+            shot, same, wanted = client.take_screenshot(), 0, 1 if in_file else 4
+            while same < wanted:  # until the views have found their ranges
                 if time.monotonic() > end:
                     raise ViewerError(f"no screenshot: the picture is not steady after {_SCREENSHOT_S:g} s")
-                shot, before = client.take_screenshot(), shot
+                if not in_file:
+                    time.sleep(0.3)
+                before, shot = shot, client.take_screenshot()
+                same = same + 1 if shot == before else 0
             reports = [report for view in client.get_state().views for report in view.reports]
         except (RuntimeError, OSError, TimeoutError) as error:
             raise ViewerError(f"no screenshot: {error}") from None
-    part = picture.with_name(f".{picture.stem}.part.png")
+    part = picture.with_name(f".{picture.stem}.{os.getpid()}.part.png")
     try:
         part.write_bytes(shot)
         part.replace(picture)
@@ -124,7 +135,9 @@ def free_port(wanted: int = 0) -> int:
 
 
 class Viewer:
-    """The viewer as a process: "web", in the browser; "window"; or "headless", drawn off screen."""
+    """The viewer as a process: "web", in the browser; "window"; "headless", drawn off screen; or "buffer",
+    which draws nothing and keeps the newest for a viewer that comes later.
+    """
 
     def __init__(
         self,
@@ -134,7 +147,8 @@ class Viewer:
         data_port: int = 0,
         size: tuple[int, int] = (1600, 1000),
     ) -> None:
-        """memory: most that may be buffered for the browser, or used by the window: "512MB"; ports: 0 is any.
+        """memory: most that may be buffered for those who come later, or used by the window:
+        "512MB"; ports: 0 is any.
 
         Raises ViewerError when it does not start.
         """
@@ -150,6 +164,8 @@ class Viewer:
                 "--server-memory-limit",
                 memory,
             ]
+        elif kind == "buffer":
+            command += ["--serve-grpc", "--server-memory-limit", memory]
         else:
             command += ["--memory-limit", memory, "--server-memory-limit", "64MB", "--hide-welcome-screen"]
         if kind == "headless":

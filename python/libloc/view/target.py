@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import os
 import signal
 import tempfile
 from contextlib import ExitStack
@@ -52,7 +54,7 @@ class ViewerPlan:
 class Target:
     """A recording that goes into a file, to a viewer, or both.
 
-    The file has its name when it is complete; until then it is NAME.part.rrd.
+    The file has its name when it is complete; until then it is NAME.PID.part.rrd, of this program alone.
     """
 
     def __init__(
@@ -62,10 +64,19 @@ class Target:
         screenshot: Path | None,
         size: tuple[int, int],
         viewer: ViewerPlan | None,
+        *,
+        overwrite: bool = False,
+        buffer: str | None = None,
     ) -> None:
+        """overwrite: replace a file that another program has written meanwhile. buffer: a screenshot alone is
+        made of what fits into so much memory, the newest ("1GB"); None: of all, through a file.
+        """
         self.keep_part = False  #: of the file, when it does not come to finish()
         self._rr, self._save, self._screenshot, self._size, self._plan = rr, save, screenshot, size, viewer
+        self._overwrite, self._buffer_size = overwrite, buffer
+        self._buffer: output.Viewer | None = None
         self.viewer: output.Viewer | None = None
+        self.kept: Path | None = None  #: what was written by the time it failed
         self.complaints: list[str] = []  #: of the viewer about what is in the screenshot
         self._checked_s = 0.0
         self._stack = ExitStack()
@@ -74,8 +85,10 @@ class Target:
         with ExitStack() as stack:
             self._file: Path | None = None
             if self._save is not None:
-                self._file = self._save.with_suffix(".part.rrd")
+                self._file = _own_part(self._save)
                 stack.callback(self._tidy)
+            elif self._screenshot is not None and self._buffer_size is not None:
+                self._buffer = stack.enter_context(output.Viewer("buffer", self._buffer_size))
             elif self._screenshot is not None:
                 folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="loc-view-"))
                 self._file = Path(folder) / "view.rrd"
@@ -86,8 +99,9 @@ class Target:
             self.stream = self._rr.RecordingStream("libloc-view")
             try:
                 sinks: list[Any] = [] if self._file is None else [self._rr.FileSink(str(self._file))]
-                if self.viewer is not None:
-                    sinks.append(self._rr.GrpcSink(self.viewer.data_url))
+                for viewer in (self.viewer, self._buffer):
+                    if viewer is not None:
+                        sinks.append(self._rr.GrpcSink(viewer.data_url))
                 self.stream.set_sinks(*sinks)
             except RuntimeError as error:
                 raise output.ViewerError(f"{self._file or 'the viewer'}: {error}") from None
@@ -108,11 +122,19 @@ class Target:
     def finish(self) -> list[str]:
         """Writes the rest, and the screenshot; tells what was written. Raises ViewerError."""
         self._flush(_FLUSH_S)
+        if self._buffer is not None and self._screenshot is not None:
+            self.complaints = output.screenshot(self._buffer.data_url, self._screenshot, self._size)
+            return [f"written: {self._screenshot}"]
         if self._file is None:
             return []
         self.stream.disconnect()  # its end is in the file then
         done = []
         if self._save is not None:
+            if self._save.exists() and not self._overwrite:
+                self.keep_part = True
+                raise output.ViewerError(
+                    f"{self._save}: another program has written it meanwhile; --overwrite replaces it"
+                )
             self._file.replace(self._save)
             self._file = self._save
             done.append(f"written: {self._save} ({self._save.stat().st_size / 1e6:.1f} MB)")
@@ -139,5 +161,19 @@ class Target:
     def _tidy(self) -> None:
         if self._file is None or self._file == self._save or not self._file.exists():
             return
-        if not self.keep_part:
+        if self.keep_part:
+            self.kept = self._file
+        else:
             self._file.unlink()
+
+
+def _own_part(path: Path) -> Path:
+    """A new, empty file beside path that no other program writes to; those of others are left alone."""
+    for number in itertools.count():
+        part = path.with_suffix(f".{os.getpid()}{f'-{number}' if number else ''}.part.rrd")
+        try:
+            part.open("xb").close()
+        except FileExistsError:
+            continue
+        return part
+    raise AssertionError
