@@ -6,7 +6,6 @@ The logs hold the LCM types of msgs/ (Python package `loc`). Exit code 1 when th
 are missing.
 """
 
-import argparse
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,11 +13,17 @@ from pathlib import Path
 import loc
 import matplotlib.pyplot as plt
 import numpy as np
-from lcm import EventLog
-
-
-class ReportError(RuntimeError):
-    pass
+from demo_runs import (
+    ReportError,
+    check_logged,
+    check_same,
+    events,
+    make_parser,
+    published,
+    run,
+    save,
+    without_host_times,
+)
 
 
 @dataclass
@@ -40,11 +45,10 @@ class Recording:
 
 
 def read(path: Path) -> Recording:
-    estimate_rows, reference_rows, estimate_bytes, imu_count, published = [], [], [], 0, None
-    for event in EventLog(str(path), "r"):
+    estimate_rows, reference_rows, estimate_bytes, imu_count, sent = [], [], [], 0, None
+    for event in events(path):
         if event.channel == "LOC_ESTIMATE":
-            # Fingerprint, time_ns, host_time_ns, sequence, publish_time_ns: 8 bytes each, then the rest.
-            estimate_bytes.append(event.data[:16] + event.data[24:32] + event.data[40:])
+            estimate_bytes.append(without_host_times(event.data))
             message = loc.estimate_t.decode(event.data)
             if message.valid & loc.estimate_t.VALID_ORIENTATION:
                 estimate_rows.append((message.time_ns, message.q_world_body_wxyz))
@@ -55,12 +59,11 @@ def read(path: Path) -> Recording:
         elif event.channel == "LOC_IMU":
             imu_count += 1
         elif event.channel == "LOC_SOURCE_STATUS":
-            message = loc.source_status_t.decode(event.data)
-            published = dict(zip(message.stream_name, message.published, strict=True)).get("imu")
+            sent = published(event.data, "imu")
     if not estimate_rows:
         raise ReportError(f"{path}: no estimate with an orientation in it")
     return Recording(
-        orientations(estimate_rows), orientations(reference_rows), estimate_bytes, imu_count, published
+        orientations(estimate_rows), orientations(reference_rows), estimate_bytes, imu_count, sent
     )
 
 
@@ -71,19 +74,8 @@ def orientations(rows) -> Orientations:
 
 def check_replay(live: Recording, replay: Recording) -> str:
     """Same estimates, bit for bit, and nothing lost on the way. Returns a sentence for the user."""
-    if live.published_imu is not None and live.imu_count != live.published_imu:
-        raise ReportError(f"the driver sent {live.published_imu} IMU samples, {live.imu_count} were logged")
-    if len(live.estimate_bytes) != len(replay.estimate_bytes):
-        raise ReportError(
-            f"{len(live.estimate_bytes)} estimates live, {len(replay.estimate_bytes)} replayed: must be equal"
-        )
-    for index, (first, second) in enumerate(zip(live.estimate_bytes, replay.estimate_bytes, strict=True)):
-        if first != second:
-            raise ReportError(f"estimate {index} of the replay differs from the live one")
-    return (
-        f"replay: all {len(live.estimate_bytes)} estimates are the live ones bit for bit"
-        f" ({live.imu_count} IMU samples, none lost)"
-    )
+    check_logged("IMU samples", live.published_imu, live.imu_count)
+    return check_same(live.estimate_bytes, replay.estimate_bytes, f"{live.imu_count} IMU samples")
 
 
 # Quaternions below are (N, 4) or (4,), w first, Hamilton.
@@ -162,9 +154,7 @@ def draw(path: Path, title: str, t, q_estimate, q_reference, heading, inclinatio
         axis.grid(alpha=0.3)
         axis.margins(x=0.01)
     figure.suptitle(title)
-    partial = path.with_name(f".{path.name}")
-    figure.savefig(partial, format="png", dpi=100)
-    partial.replace(path)
+    save(figure, path, dpi=100)
 
 
 def report(arguments) -> None:
@@ -211,13 +201,7 @@ def report(arguments) -> None:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--live", type=Path, required=True)
-    parser.add_argument("--replay", type=Path, required=True)
-    parser.add_argument("--picture", type=Path, required=True)
-    parser.add_argument("--title", required=True)
+    parser = make_parser(__doc__)
     parser.add_argument(
         "--mounting",
         type=float,
@@ -225,13 +209,7 @@ def main() -> int:
         metavar=("FROM", "TO"),
         help="standstill [s] from which the tilt between IMU and reference is taken",
     )
-    arguments = parser.parse_args()
-    try:
-        report(arguments)
-    except (ReportError, OSError, ValueError) as error:
-        print(f"demo_report.py: {error}", file=sys.stderr)
-        return 1
-    return 0
+    return run(report, parser)
 
 
 if __name__ == "__main__":

@@ -7,17 +7,26 @@ The logs hold the LCM types of msgs/ (Python package `loc`). The truth is LOC_RE
 file (poses of the body). Exit code 1 when the runs differ or pictures were lost.
 """
 
-import argparse
 import io
 import re
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import demo_runs
 import loc
 import matplotlib.pyplot as plt
 import numpy as np
-from lcm import EventLog
+from demo_runs import (
+    ReportError,
+    check_logged,
+    check_same,
+    events,
+    make_parser,
+    published,
+    save,
+    without_host_times,
+)
 from PIL import Image
 
 SHOWN_PICTURES = 3
@@ -32,10 +41,6 @@ EARTH_RADIUS_M = 6_378_137.0
 MOVING_M_S = 0.03  # a truth that is slower stands still
 MAX_GAP_NS = 100_000_000
 KNOWN_SHARE = 0.3  # a point's deviation over its distance
-
-
-class ReportError(RuntimeError):
-    pass
 
 
 @dataclass
@@ -82,10 +87,9 @@ class Run:
 
 def read(path: Path) -> Run:
     run = Run()
-    for event in EventLog(str(path), "r"):
+    for event in events(path):
         if event.channel == "LOC_ESTIMATE":
-            # Fingerprint, time_ns, host_time_ns, sequence, publish_time_ns: 8 bytes each, then the rest.
-            run.same.append(event.data[:16] + event.data[24:32] + event.data[40:])
+            run.same.append(without_host_times(event.data))
             message = loc.estimate_t.decode(event.data)
             run.method = message.method
             if message.valid & message.VALID_POSITION:
@@ -121,8 +125,7 @@ def read(path: Path) -> Run:
             for word in loc.estimator_status_t.decode(event.data).condition:
                 run.conditions[word] = run.conditions.get(word, 0) + 1
         elif event.channel == "LOC_SOURCE_STATUS":
-            message = loc.source_status_t.decode(event.data)
-            run.published = dict(zip(message.stream_name, message.published, strict=True)).get("image")
+            run.published = published(event.data, "image")
         elif event.channel == "LOC_STATISTICS":
             message = loc.statistics_t.decode(event.data)
             if message.program == "loc-estimator":
@@ -145,23 +148,14 @@ def add_known_points(run: Run, message) -> None:
 
 def check_replay(live: Run, replay: Run) -> str:
     """Same estimates, bit for bit, and no picture lost. Returns a sentence for the user."""
-    if live.published is not None and len(live.pictures) != live.published:
-        raise ReportError(f"the driver sent {live.published} pictures, {len(live.pictures)} were logged")
+    check_logged("pictures", live.published, len(live.pictures))
     for name, run in (("live", live), ("the replay", replay)):
         if len(run.frames) != len(live.pictures):
             raise ReportError(
                 f"{name}: {len(run.frames)} of {len(live.pictures)} pictures reached the filter:"
                 " is the machine busy?"
             )
-    if len(live.same) != len(replay.same):
-        raise ReportError(f"{len(live.same)} estimates live, {len(replay.same)} replayed: must be equal")
-    for index, (first, second) in enumerate(zip(live.same, replay.same, strict=True)):
-        if first != second:
-            raise ReportError(f"estimate {index} of the replay differs from the live one")
-    return (
-        f"replay: all {len(live.same)} estimates are the live ones bit for bit"
-        f" ({len(live.pictures)} pictures, none lost)"
-    )
+    return check_same(live.same, replay.same, f"{len(live.pictures)} pictures")
 
 
 def rotate(q_wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -432,9 +426,7 @@ def draw(path: Path, title: str, run: Run, comparison: Comparison, rows) -> None
     axes[0].sharex(axes[2])
     axes[1].sharex(axes[2])
     figure.suptitle(title)
-    partial = path.with_name(f".{path.name}")
-    figure.savefig(partial, format="png", dpi=90)
-    partial.replace(path)
+    save(figure, path, dpi=90)
 
 
 def report(arguments) -> None:
@@ -451,24 +443,12 @@ def report(arguments) -> None:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--live", type=Path, required=True)
-    parser.add_argument("--replay", type=Path, required=True)
-    parser.add_argument("--picture", type=Path, required=True)
-    parser.add_argument("--title", required=True)
+    parser = make_parser(__doc__)
     parser.add_argument("--truth", type=Path, help="TUM file with poses of the body, where the log has none")
     parser.add_argument(
         "--camera", type=Path, help="sensor.yaml of the camera (EuRoC): where it is in the body"
     )
-    arguments = parser.parse_args()
-    try:
-        report(arguments)
-    except (ReportError, OSError, ValueError) as error:
-        print(f"demo_slam_report.py: {error}", file=sys.stderr)
-        return 1
-    return 0
+    return demo_runs.run(report, parser)
 
 
 if __name__ == "__main__":
