@@ -2,13 +2,13 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "libloc/calib/dense.hpp"
 #include "libloc/calib/least_squares.hpp"
 #include "libloc/calib/sphere_coverage.hpp"
 #include "libloc/core/check.hpp"
@@ -62,9 +62,9 @@ std::optional<std::pair<Eigen::Vector3d, double>> sphere(const std::vector<Eigen
     a.row(i) << 2 * q.transpose(), 1;
     b[i] = q.squaredNorm();
   }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> spread(a.leftCols<3>());
-  if (!(spread.singularValues()[2] > kFlat * spread.singularValues()[0])) return std::nullopt;
-  const Eigen::Vector4d x = a.colPivHouseholderQr().solve(b);
+  const Eigen::VectorXd spread = dense::singular_values(a.leftCols<3>());
+  if (!(spread[2] > kFlat * spread[0])) return std::nullopt;
+  const Eigen::Vector4d x = dense::least_squares(a, b);
   const double r2 = x[3] + x.head<3>().squaredNorm();
   if (!(std::isfinite(r2) && r2 > 0)) return std::nullopt;
   return std::pair<Eigen::Vector3d, double>{mean + size * x.head<3>(), size * std::sqrt(r2)};
@@ -81,7 +81,7 @@ std::optional<Vector9d> quadric_start(const Scaled& scaled, const Use& use) {
         y.x(), y.y(), y.z();
   }
   if (n < kN) return std::nullopt;
-  const Eigen::VectorXd q = a.topRows(n).colPivHouseholderQr().solve(Eigen::VectorXd::Ones(n));
+  const Eigen::VectorXd q = dense::least_squares(a.topRows(n), Eigen::VectorXd::Ones(n));
   Eigen::Matrix3d m;
   m << q[0], q[3], q[4], q[3], q[1], q[5], q[4], q[5], q[2];
   const Eigen::LDLT<Eigen::Matrix3d> ldlt(m);
@@ -229,7 +229,7 @@ Use inliers_of(const Scaled& scaled, const Use& use, const Solution& s, double s
   for (std::size_t i = 0; i < use.size(); ++i) {
     const double r = gravity_residual(s.result.x, scaled.y[i], &row);
     const double own = s.pose_variance + scaled.sample_variance[i];
-    const double spread = (row * *cov * row.transpose())(0, 0);
+    const double spread = dense::propagate(row, *cov)(0, 0);
     // A pose in the fit has drawn it towards itself, one outside has not.
     const double variance = use[i] ? std::max(own - spread, 0.05 * own) : own + spread;
     inlier[i] = r * r <= limit * limit * variance;
@@ -246,7 +246,7 @@ double predicted_error(const Vector9d& p, const Eigen::MatrixXd& cov) {
     const Eigen::Vector3d v = ldlt.solve(SphereCoverage::direction(cell));
     Eigen::Matrix<double, 3, kN> j;
     j << -m, entry_jacobian(v);
-    sum += (j * cov * j.transpose()).trace();
+    sum += dense::propagate(j, cov).trace();
   }
   return std::sqrt(sum / SphereCoverage::kCells);
 }
@@ -398,9 +398,9 @@ AccelerometerFit fit_accelerometer(std::span<const StillPose> poses, const Accel
   }
   p = solution.result.x;
 
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(symmetric(p));
+  const Eigen::VectorXd axes = dense::symmetric_eigenvalues(symmetric(p));
   const auto cov = covariance_from(solution.result.information);
-  if (!p.allFinite() || !cov || !(axes.eigenvalues()[0] * kWorstAxisRatio > axes.eigenvalues()[2])) {
+  if (!p.allFinite() || !cov || !(axes[0] * kWorstAxisRatio > axes[2])) {
     return refuse("The still poses do not determine the nine parameters: turn the device into more directions.");
   }
   out.solved = true;

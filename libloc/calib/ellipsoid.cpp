@@ -1,12 +1,13 @@
 #include "libloc/calib/ellipsoid.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <numeric>
 #include <vector>
 
+#include "libloc/calib/dense.hpp"
 #include "libloc/calib/ellipsoid_detail.hpp"
 #include "libloc/core/check.hpp"
 
@@ -128,7 +129,7 @@ Ellipsoid sphere_start(const NormalisedReadings& readings) {
     normal += readings.weights[i] * row * row.transpose();
     right += readings.weights[i] * row * readings.z.col(i).squaredNorm();
   }
-  const Eigen::Vector4d solution = normal.ldlt().solve(right);
+  const Eigen::Vector4d solution = dense::solve_symmetric(normal, right);
   const double square = solution[3] + solution.head<3>().squaredNorm();
   if (solution.allFinite() && square > 0) {
     e.centre = solution.head<3>();
@@ -190,18 +191,23 @@ Matrix9 effect_of_shape(const Ellipsoid& e, double prior_sigma, const Matrix9& i
   Eigen::Matrix<double, 6, 1> residual;
   Eigen::Matrix<double, 6, 6> jacobian;
   detail::shape_prior(e, prior_sigma, residual, jacobian);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> prior(jacobian.transpose() * jacobian);
-  Eigen::Matrix<double, 9, 5> shapes = Eigen::Matrix<double, 9, 5>::Zero();
-  shapes.bottomRows<6>() = prior.eigenvectors().rightCols<5>();  // the first one is the size, which has no prior
-  Eigen::Matrix<double, 9, 9> directions;
-  directions << basis, shapes;
-  Matrix9 normal = directions.transpose() * information * directions;
-  normal.diagonal().tail<5>() += prior.eigenvalues().tail<5>();
-  const Eigen::LDLT<Matrix9> ldlt(normal);
-  const Eigen::Matrix<double, 5, 1> shape = ldlt.solve(-(directions.transpose() * gradient)).tail<5>();
-  const Eigen::Matrix<double, 5, 5> shape_cov = ldlt.solve(Matrix9::Identity()).bottomRightCorner<5, 5>();
-  const Eigen::Matrix<double, 9, 5> effect = basis * sphere_cov * basis.transpose() * information * shapes;
-  return effect * (shape_cov + shape * shape.transpose()) * effect.transpose();
+  const dense::SymmetricEigen prior = dense::symmetric_eigen(dense::gram(jacobian));
+  Eigen::MatrixXd shapes = Eigen::MatrixXd::Zero(9, 5);
+  shapes.bottomRows(6) = prior.vectors.rightCols(5);  // the first one is the size, which has no prior
+  Eigen::MatrixXd turned(9, 9);                       // transposed: a direction per row
+  turned.topRows(4) = basis.transpose();
+  turned.bottomRows(5) = shapes.transpose();
+  Eigen::MatrixXd normal = dense::propagate(turned, information);
+  normal.diagonal().tail(5) += prior.values.tail(5);
+  Eigen::MatrixXd right(9, 10);
+  right.col(0) = -dense::product(turned, gradient);
+  right.rightCols(9).setIdentity();
+  const Eigen::MatrixXd solution = dense::solve_symmetric(normal, right);
+  const Eigen::MatrixXd shape = solution.bottomLeftCorner(5, 1);
+  const Eigen::MatrixXd shape_cov = solution.bottomRightCorner(5, 5);
+  const Eigen::MatrixXd effect =
+      dense::product(dense::propagate(basis, sphere_cov), dense::product(information, shapes));
+  return dense::propagate(effect, shape_cov + dense::gram(shape.transpose()));
 }
 
 // Covariance of centre and matrix (normalised) from the curvature of the cost; for Tukey's loss with Huber's factors
@@ -271,7 +277,7 @@ Matrix9 covariance(const NormalisedReadings& readings, const Ellipsoid& e, const
     Eigen::Matrix<double, 6, 1> residual;
     Eigen::Matrix<double, 6, 6> jacobian;
     detail::shape_prior(e, options.shape_prior_sigma, residual, jacobian);
-    prior.bottomRightCorner<6, 6>() = jacobian.transpose() * jacobian;
+    prior.bottomRightCorner<6, 6>() = dense::gram(jacobian);
   }
   Eigen::MatrixXd basis = Eigen::MatrixXd::Identity(9, 9);
   if (sphere) {
@@ -279,14 +285,13 @@ Matrix9 covariance(const NormalisedReadings& readings, const Ellipsoid& e, const
     basis.topLeftCorner<3, 3>().setIdentity();
     basis.block<3, 1>(3, 3).setOnes();
   }
-  const Eigen::MatrixXd curvature = basis.transpose() * (slope * hessian + prior) * basis;
-  const Eigen::MatrixXd spread = basis.transpose() * (variance * hessian + prior) * basis;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(curvature);
-  const Eigen::VectorXd values = eigen.eigenvalues();
+  const Eigen::MatrixXd rows = basis.transpose();
+  const dense::SymmetricEigen eigen = dense::symmetric_eigen(dense::propagate(rows, slope * hessian + prior));
+  const Eigen::MatrixXd spread = dense::propagate(rows, variance * hessian + prior);
+  const Eigen::VectorXd& values = eigen.values;
   if (!(values[0] > 1e-14 * values[values.size() - 1])) return Matrix9::Constant(kUnknown);
-  const Eigen::MatrixXd inverse =
-      eigen.eigenvectors() * values.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
-  const Matrix9 cov = basis * (inverse * spread * inverse) * basis.transpose();
+  const Eigen::MatrixXd inverse = dense::compose(eigen.vectors, values.cwiseInverse());
+  const Matrix9 cov = dense::propagate(basis, dense::propagate(inverse, spread));
   if (!sphere || options.shape_prior_sigma <= 0) return cov;
   return cov + effect_of_shape(e, options.shape_prior_sigma, slope * hessian, gradient, basis, inverse);
 }
@@ -321,21 +326,20 @@ void fill_result(const NormalisedReadings& readings, const Ellipsoid& e, const M
     j.bottomRightCorner<6, 6>().diagonal().setConstant(to_matrix);
   } else {
     // The size is not ours to tell: W / cbrt(det W), whose change is (dW - W tr(W^-1 dW) / 3) / cbrt(det W).
-    const Eigen::Matrix3d inverse = e.matrix.ldlt().solve(Eigen::Matrix3d::Identity());
+    const Eigen::Matrix3d inverse = e.matrix.inverse();
     for (int k = 0; k < 6; ++k) {
       const Eigen::Matrix3d change = symmetric(Eigen::Matrix<double, 6, 1>::Unit(k));
       j.block<6, 1>(3, 3 + k) = elements(change - e.matrix * ((inverse * change).trace() / 3)) / root;
     }
   }
-  fit.cov = j * cov * j.transpose();
+  fit.cov = dense::propagate(j, cov);
 
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> shape(e.matrix, Eigen::EigenvaluesOnly);
-  fit.axis_ratio = shape.eigenvalues()[2] / shape.eigenvalues()[0];
+  const Eigen::VectorXd axes = dense::symmetric_eigenvalues(e.matrix);
+  fit.axis_ratio = axes[2] / axes[0];
   fit.centre_over_radius = fit.centre.norm() / fit.radius;
   const Eigen::Matrix3d centre_cov = fit.cov.topLeftCorner<3, 3>();
   if (centre_cov.allFinite()) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> centre(centre_cov, Eigen::EigenvaluesOnly);
-    fit.centre_sigma = std::sqrt(std::max(0.0, centre.eigenvalues()[2])) / fit.radius;
+    fit.centre_sigma = std::sqrt(std::max(0.0, dense::symmetric_eigenvalues(centre_cov)[2])) / fit.radius;
   }
 }
 

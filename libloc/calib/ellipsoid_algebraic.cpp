@@ -1,8 +1,10 @@
-#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "libloc/calib/dense.hpp"
 #include "libloc/calib/ellipsoid_detail.hpp"
 
 namespace loc::detail {
@@ -79,12 +81,10 @@ std::optional<Ellipsoid> ellipsoid_of(const Vector10& q) {
 std::optional<Ellipsoid> fit_lsq(const QuarticMoments& moments) {
   // The mean of points of an ellipsoid lies inside it, hence in centred readings "= 1" has a solution.
   const Matrix10 s = moments.scatter();
-  const Eigen::LDLT<Matrix9> ldlt(s.topLeftCorner<9, 9>());
-  if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 1e-14 * ldlt.vectorD().maxCoeff())) {
-    return std::nullopt;
-  }
+  const auto solution = dense::solve_definite(s.topLeftCorner<9, 9>(), s.topRightCorner<9, 1>(), 1e-14);
+  if (!solution) return std::nullopt;
   Vector10 quadric;
-  quadric << ldlt.solve(s.topRightCorner<9, 1>()), -1;
+  quadric << solution->col(0), -1;
   return ellipsoid_of(quadric);
 }
 
@@ -100,9 +100,9 @@ std::optional<Ellipsoid> fit_li_griffiths(const QuarticMoments& moments) {
   Eigen::Matrix<double, 6, 6> constraint = Eigen::Matrix<double, 6, 6>::Zero();
   constraint.topLeftCorner<3, 3>() << -1, 1, 1, 1, -1, 1, 1, 1, -1;
   constraint.diagonal().tail<3>().setConstant(-1);  // -k f^2 = -(2f)^2: the mixed terms are written 2f yz
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(constraint, reduced);
-  if (eigen.info() != Eigen::Success || !(eigen.eigenvalues()[5] > 0)) return std::nullopt;
-  const Eigen::Matrix<double, 6, 1> q1 = eigen.eigenvectors().col(5);
+  const auto eigen = dense::generalised_eigen(constraint, reduced);
+  if (!eigen || !(eigen->values[5] > 0)) return std::nullopt;
+  const Eigen::Matrix<double, 6, 1> q1 = eigen->vectors.col(5);
   Vector10 quadric;
   quadric << q1, to_rest * q1;
   return ellipsoid_of(quadric);
@@ -111,16 +111,14 @@ std::optional<Ellipsoid> fit_li_griffiths(const QuarticMoments& moments) {
 std::optional<Ellipsoid> fit_als(const QuarticMoments& moments) {
   // The noise variance is where the corrected scatter matrix becomes singular; it grows out of definiteness only once
   // below the smallest variance of the readings themselves.
-  const auto smallest = [&](double variance) {
-    return Eigen::SelfAdjointEigenSolver<Matrix10>(moments.scatter(variance), Eigen::EigenvaluesOnly).eigenvalues()[0];
-  };
+  const auto smallest = [&](double variance) { return dense::symmetric_eigenvalues(moments.scatter(variance))[0]; };
   const Matrix10 plain = moments.scatter();
   Eigen::Matrix3d second;
   second << plain(0, 9), plain(3, 9), plain(4, 9), plain(3, 9), plain(1, 9), plain(5, 9), plain(4, 9), plain(5, 9),
       plain(2, 9);
   const Eigen::Vector3d mean = plain.block<3, 1>(6, 9);
   const Eigen::Matrix3d covariance = second - mean * mean.transpose();
-  double high = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  double high = dense::symmetric_eigenvalues(covariance)[0];
   if (!(high > 0)) return std::nullopt;
   double low = 0;
   // The first root: from below in steps that double.
@@ -136,8 +134,7 @@ std::optional<Ellipsoid> fit_als(const QuarticMoments& moments) {
     const double middle = (low + high) / 2;
     (smallest(middle) > 0 ? low : high) = middle;
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix10> eigen(moments.scatter((low + high) / 2));
-  return ellipsoid_of(eigen.eigenvectors().col(0));
+  return ellipsoid_of(dense::symmetric_eigen(moments.scatter((low + high) / 2)).vectors.col(0));
 }
 
 }  // namespace loc::detail

@@ -1,14 +1,14 @@
 #include "libloc/calib/gyroscope.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
 
+#include "libloc/calib/dense.hpp"
 #include "libloc/calib/gyroscope_start.hpp"
 #include "libloc/calib/least_squares.hpp"
 #include "libloc/core/check.hpp"
@@ -70,7 +70,7 @@ Directions gravity_directions(std::span<const StillSegment> segments, const Acce
     jacobian << -m, entries;
     j.middleRows<3>(3 * i) = across * jacobian;
   }
-  if (accelerometer.cov.allFinite()) d.cov += j * accelerometer.cov * j.transpose();
+  if (accelerometer.cov.allFinite()) d.cov += dense::propagate(j, accelerometer.cov);
   return d;
 }
 
@@ -205,7 +205,7 @@ class TurnProblem {
       for (Eigen::Index i = 0; i < segments; ++i) {
         bias_cov.block<3, 3>(3 * i, 3 * i) = biases_.cov[static_cast<std::size_t>(i)];
       }
-      out.cov += by_direction * directions_.cov * by_direction.transpose() + by_bias * bias_cov * by_bias.transpose();
+      out.cov += dense::propagate(by_direction, directions_.cov) + dense::propagate(by_bias, bias_cov);
       // Data without any noise must not make the covariance singular: a microradian is less than any sensor knows.
       out.cov.diagonal().array() += 1e-12;
     }
@@ -225,11 +225,12 @@ LeastSquaresResult solve(const TurnProblem& problem, Eigen::Matrix3d& matrix) {
   LeastSquaresResult result;
   for (int round = 0; round < 3; ++round) {
     const double scale = std::cbrt(std::abs(matrix.determinant()));
-    const Eigen::LLT<Eigen::MatrixXd> root(problem.evaluate(matrix, false, true).cov);
+    const auto root = dense::cholesky(problem.evaluate(matrix, false, true).cov);
+    if (!root) throw DataError("the covariance of the turns is not positive definite");
     const ResidualFunction function = [&](const Eigen::VectorXd& x, Eigen::VectorXd& r, Eigen::MatrixXd* jacobian) {
       const Stacked s = problem.evaluate(scale * from_rows(x), false, false);
-      r = root.matrixL().solve(s.residuals);
-      if (jacobian != nullptr) *jacobian = root.matrixL().solve(s.jacobian * scale);
+      r = dense::solve_lower(*root, s.residuals);
+      if (jacobian != nullptr) *jacobian = dense::solve_lower(*root, s.jacobian * scale);
     };
     result = minimise(function, to_rows(matrix / scale), {.max_iterations = 50, .step_tolerance = 1e-9});
     matrix = scale * from_rows(result.x);
@@ -506,8 +507,7 @@ GyroscopeFit fit_gyroscope(std::span<const TimeNs> times_ns, const TriadRows& gy
     return bias_only("The turns do not determine scale and misalignment: turn about all axes.");
   const double scale = std::cbrt(std::abs(matrix.determinant()));
   const double inflation = std::max(1.0, fit.chi2_ratio);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> worst(*cov * inflation);
-  fit.relative_sigma = std::sqrt(worst.eigenvalues()[8]) * small_sample_factor(dof);
+  fit.relative_sigma = std::sqrt(dense::symmetric_eigenvalues(*cov * inflation)[8]) * small_sample_factor(dof);
   fit.cov = *cov * (inflation * scale * scale);
   if (!(fit.relative_sigma <= options.warn_sigma)) {
     return bias_only("Predicted deviation of scale and misalignment " + percent(fit.relative_sigma) + ", at most " +
@@ -517,8 +517,7 @@ GyroscopeFit fit_gyroscope(std::span<const TimeNs> times_ns, const TriadRows& gy
   fit.converged = result.converged;
   fit.triad.matrix = matrix;
   fit.left_handed = matrix.determinant() < 0;
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d turned = svd.matrixU() * svd.matrixV().transpose() * (fit.left_handed ? -1 : 1);
+  const Eigen::Matrix3d turned = dense::nearest_orthogonal(matrix) * (fit.left_handed ? -1 : 1);
   fit.rotation_angle = Eigen::AngleAxisd(turned).angle();
 
   // What said "bias only" no longer holds.

@@ -1,12 +1,11 @@
 #include "libloc/calib/least_squares.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
 
+#include "libloc/calib/dense.hpp"
 #include "libloc/core/check.hpp"
 #include "libloc/core/statistics.hpp"
 
@@ -29,7 +28,7 @@ LeastSquaresResult minimise(const ResidualFunction& function, const Eigen::Vecto
   Eigen::VectorXd trial_residuals;
   while (result.iterations < options.max_iterations && !result.converged) {
     ++result.iterations;
-    const Eigen::MatrixXd hessian = jacobian.transpose() * jacobian;
+    const Eigen::MatrixXd hessian = dense::gram(jacobian);
     const Eigen::VectorXd gradient = jacobian.transpose() * result.residuals;
     // Parameters differ by orders of magnitude: damp each by its own curvature, and a little where there is none.
     const double floor = std::max(1e-12 * hessian.diagonal().maxCoeff(), std::numeric_limits<double>::min());
@@ -38,7 +37,7 @@ LeastSquaresResult minimise(const ResidualFunction& function, const Eigen::Vecto
     while (!accepted && !result.converged) {
       Eigen::MatrixXd damped = hessian;
       damped.diagonal() += damping * scale;
-      const Eigen::VectorXd step = damped.ldlt().solve(-gradient);
+      const Eigen::VectorXd step = dense::solve_symmetric(damped, -gradient);
       // Lengths are compared in the metric of the curvature, where all parameters have one unit.
       const Eigen::VectorXd root = scale.cwiseSqrt();
       const double step_size = step.cwiseProduct(root).norm();
@@ -69,7 +68,7 @@ LeastSquaresResult minimise(const ResidualFunction& function, const Eigen::Vecto
     }
     if (!accepted) break;
   }
-  result.information = jacobian.transpose() * jacobian;
+  result.information = dense::gram(jacobian);
   return result;
 }
 
@@ -77,11 +76,10 @@ std::optional<Eigen::MatrixXd> covariance_from(const Eigen::MatrixXd& informatio
   if (!information.allFinite() || !(information.diagonal().array() > 0).all()) return std::nullopt;
   const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scaled);
-  const Eigen::VectorXd& values = solver.eigenvalues();
+  const dense::SymmetricEigen eigen = dense::symmetric_eigen(scaled);
+  const Eigen::VectorXd& values = eigen.values;
   if (!(values[0] > 1e-13 * values[values.size() - 1])) return std::nullopt;
-  const Eigen::MatrixXd inverse =
-      solver.eigenvectors() * values.cwiseInverse().asDiagonal() * solver.eigenvectors().transpose();
+  const Eigen::MatrixXd inverse = dense::compose(eigen.vectors, values.cwiseInverse());
   return scale.asDiagonal() * inverse * scale.asDiagonal();
 }
 

@@ -1,14 +1,13 @@
 #include "libloc/calib/magnetometer_alignment.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-#include <Eigen/SVD>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
 
+#include "libloc/calib/dense.hpp"
 #include "libloc/calib/least_squares.hpp"
 #include "libloc/core/check.hpp"
 #include "libloc/core/statistics.hpp"
@@ -147,13 +146,11 @@ Eigen::Quaterniond linear_start(const std::vector<FieldInterval>& intervals) {
     for (int column = 0; column < 3; ++column) {
       a.middleCols<3>(3 * column) = k.end[column] * Eigen::Matrix3d::Identity() - k.begin[column] * back;
     }
-    normal += a.transpose() * a;
+    normal += dense::gram(a);
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> solver(normal);
-  const Eigen::Matrix<double, 9, 1> entries = solver.eigenvectors().col(0);
+  const Eigen::Matrix<double, 9, 1> entries = dense::symmetric_eigen(normal).vectors.col(0);
   const Eigen::Matrix3d g = Eigen::Map<const Eigen::Matrix3d>(entries.data());
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(g, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d r = svd.matrixU() * svd.matrixV().transpose();
+  Eigen::Matrix3d r = dense::nearest_orthogonal(g);
   if (r.determinant() < 0) r = -r;  // the sign of the solution is free
   return Eigen::Quaterniond(r).normalized();
 }
@@ -300,8 +297,10 @@ Eigen::MatrixXd cautious_covariance(const Problem& problem, const AlignmentVecto
     Eigen::Matrix<double, 4, 8> jacobian;
     const Eigen::Vector4d residual = weight.cwiseAbs2().cwiseProduct(problem.residual(k, x, errors, &jacobian));
     // Pull of the block on the solution: the calibrations' errors follow, so their columns count too.
-    score += cov_all.topLeftCorner<8, 8>() * (jacobian.transpose() * residual) +
-             cov_all.topRightCorner<8, kCalibrationErrors>() * (problem.effects[k].transpose() * residual);
+    Eigen::VectorXd pull(8 + kCalibrationErrors);
+    pull.head<8>() = jacobian.transpose() * residual;
+    pull.tail<kCalibrationErrors>() = problem.effects[k].transpose() * residual;
+    score += dense::product(cov_all.topRows(8), pull);
     if ((k + 1) % block == 0 || k + 1 == intervals.size()) {
       scores += score * score.transpose();
       score.setZero();
@@ -309,14 +308,12 @@ Eigen::MatrixXd cautious_covariance(const Problem& problem, const AlignmentVecto
     }
   }
   scores *= static_cast<double>(blocks) / std::max(1.0, static_cast<double>(blocks) - 1);
-  const Eigen::LLT<Eigen::MatrixXd> llt(cov);
-  if (llt.info() != Eigen::Success) return cov;
+  const auto root = dense::cholesky(cov);
+  if (!root) return cov;
   // In units of the curvature's own deviations the model says 1 in every direction.
-  const Eigen::MatrixXd root = llt.matrixL();
-  const Eigen::MatrixXd half = llt.matrixL().solve(Eigen::MatrixXd(scores));
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(llt.matrixL().solve(half.transpose().eval()));
-  const Eigen::MatrixXd directions = root * eigen.eigenvectors();
-  return directions * eigen.eigenvalues().cwiseMax(1.0).asDiagonal() * directions.transpose();
+  const Eigen::MatrixXd half = dense::solve_lower(*root, scores);
+  const dense::SymmetricEigen eigen = dense::symmetric_eigen(dense::solve_lower(*root, half.transpose()));
+  return dense::compose(dense::product(*root, eigen.vectors), eigen.values.cwiseMax(1.0));
 }
 
 /// The signed axes that the matrix is nearest to, and by how much it is off.
@@ -515,9 +512,9 @@ MagnetometerAlignment align_magnetometer(std::span<const TimeNs> times_ns, const
     turning += angle * angle.transpose();
     out.gravity_readings += k.has_gravity ? 1 : 0;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(turning);
-  const double total = spread.eigenvalues()[2];
-  out.second_axis_share = total > 0 ? std::sqrt(std::max(0.0, spread.eigenvalues()[1]) / total) : 0;
+  const Eigen::VectorXd spread = dense::symmetric_eigenvalues(turning);
+  const double total = spread[2];
+  out.second_axis_share = total > 0 ? std::sqrt(std::max(0.0, spread[1]) / total) : 0;
 
   Eigen::Quaterniond r = best_start(intervals);
   AlignmentVector x = AlignmentVector::Zero();
@@ -555,7 +552,7 @@ MagnetometerAlignment align_magnetometer(std::span<const TimeNs> times_ns, const
   out.solved = true;
   out.matrix = r.toRotationMatrix();
   out.cov = cov->topLeftCorner<3, 3>();
-  out.sigma = std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(out.cov).eigenvalues()[2]);
+  out.sigma = std::sqrt(dense::symmetric_eigenvalues(out.cov)[2]);
   out.angle = Eigen::AngleAxisd(r).angle();
   out.gyroscope_bias = x.segment<3>(3);
   out.delay_s = x[7];
