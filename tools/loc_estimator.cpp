@@ -22,7 +22,6 @@
 #include "tools/support/rig_option.hpp"
 #include "tools/support/slam_options.hpp"
 #ifdef LOC_HAVE_VISION
-#include "libloc/vision/image_slam.hpp"
 #include "tools/support/open_image_source.hpp"
 #endif
 
@@ -33,10 +32,6 @@ std::unique_ptr<loc::MeasurementSource> open(const loc::SourceSpec& source) {
   return loc::open_source_with_images(source);
 }
 
-loc::SlamOptions options_for_images(const loc::SlamOptions& options) {
-  return loc::slam_options_for_images(options);
-}
-
 void become_program_with_images(char** /*argv*/) {}
 
 void set_front_end(loc::AnyEstimator& estimator, const loc::CameraCalibration& camera) {
@@ -45,10 +40,6 @@ void set_front_end(loc::AnyEstimator& estimator, const loc::CameraCalibration& c
 #else
 std::unique_ptr<loc::MeasurementSource> open(const loc::SourceSpec& source) {
   return loc::open_source(source);
-}
-
-loc::SlamOptions options_for_images(const loc::SlamOptions& options) {
-  return options;
 }
 
 void become_program_with_images(char** argv) {
@@ -106,13 +97,7 @@ loc::EstimatorSettings settings_of(const Arguments& arguments, const loc::Rig& r
     throw loc::UsageError("--world " + arguments.world + ": " + arguments.method + " estimates in ENU only");
   }
   if (loc::is_slam(arguments.method)) {
-    loc::SlamOptions usual;
-    usual.motion = loc::slam_motion(arguments.method);
-    // What is usual for pictures depends on their size.
-    const auto camera = static_cast<std::size_t>(arguments.slam.camera);
-    if (camera < rig.cameras.size()) usual.camera = rig.cameras[camera];
-    if (arguments.slam.images) usual = options_for_images(usual);
-    settings.slam = loc::slam_options(arguments.slam, arguments.method, rig, usual);
+    settings.slam = loc::slam_options(arguments.slam, arguments.method, rig);
     settings.slam_start = loc::slam_start(arguments.slam, settings.slam);
     const bool inertial = settings.slam.motion == loc::SlamMotion::kInertial;
     if (!arguments.fusion.no_gps) {

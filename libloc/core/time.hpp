@@ -20,6 +20,11 @@ constexpr double to_seconds(TimeNs duration_ns) {
   return static_cast<double>(duration_ns) * 1e-9;
 }
 
+/// a - b [s] of any two times, also such whose difference is no TimeNs; exact to a microsecond.
+constexpr double apart_s(TimeNs a, TimeNs b) {
+  return 1e-9 * (static_cast<double>(a) - static_cast<double>(b));
+}
+
 /// Duration in nanoseconds, rounded to the nearest.
 /// @throws std::invalid_argument when not finite or beyond +-292 years.
 TimeNs from_seconds(double seconds);

@@ -54,6 +54,11 @@ enum EstimateStatus : std::uint32_t {
   kCalibrationDoubtful = 1U << 25U,  ///< Pictures disagree with the map in a way that wrong intrinsics explain.
   kTiltDoubtful = 1U << 26U,         ///< The accelerometers by themselves say another vertical.
   kStampsDoubtful = 1U << 27U,       ///< Camera and gyroscope turn alike, but not at the same time.
+  /// It was lost and goes on in surroundings that are new: where they are in the map from before, and for a camera
+  /// alone how long its unit of lengths is now, is a guess, as the covariance says. Until something of that map is seen
+  /// again.
+  kMapLinkUnknown = 1U << 28U,
+  kGpsStampsDoubtful = 1U << 29U,  ///< Fixes fit the way gone at another time than their stamps say.
 };
 
 /// Error-state order of the covariance: theta, position, velocity, gyroscope bias, accelerometer bias.

@@ -106,7 +106,8 @@ InertialFusion::InertialFusion(const InertialFusionOptions& options)
     : options_((options.check(), options)),
       bank_(options.heading_bank, options.filter),
       start_(options.start, options.stand_still, options.filter.noise, options.filter.gravity.norm()),
-      rest_(options.stand_still, options.filter.noise, options.filter.gravity.norm()) {
+      rest_(options.stand_still, options.filter.noise, options.filter.gravity.norm()),
+      lag_({.window_s = 20, .drift_order = 2}) {
   if (options.origin) world_.emplace(*options.origin);
   if (options.given_start) {
     // What is wrong with it is told now, not at the first sample.
@@ -347,6 +348,7 @@ bool InertialFusion::step(const ImuMeasurement& imu) {
     return collect(imu);
   }
   if (outcome == PredictOutcome::kBridged) status_ |= kBridged | kGap;
+  reckoning_.step(imu, options_.filter.gravity.norm());
   ++imu_used_;
   const std::vector<FusionResult> results = bank_.results();
   for (const FusionResult& result : results) take_note(result);
@@ -366,6 +368,8 @@ void InertialFusion::start_anew(std::uint32_t status) {
   start_.reset();
   pose_before_.reset();
   watches_.clear();
+  lag_.break_off();
+  reckoning_.stop();
   next_status_ |= status;
   ++counts_["start.again"];
 }
@@ -391,6 +395,7 @@ Estimate InertialFusion::estimate() const {
   out.host_time_ns = last_.host_time_ns;
   out.sequence = last_.sequence;
   out.status = status_;
+  if (lag_.doubtful()) out.status |= kGpsStampsDoubtful;
   if (!running_) {
     out.status |= kInitialising;
     return out;
@@ -431,6 +436,7 @@ NamedCounts InertialFusion::counts() const {
   NamedCounts out = {{"imu.used", imu_used_}};
   for (const auto& [name, value] : all) out.push_back({name, value});
   out.push_back({"rest.false_alarms", rest_.false_alarms()});
+  if (lag_.doubtful()) out.push_back({"stamps.gps_to_add_ms", std::llround(1e3 * lag_.offset_s())});
   return out;
 }
 

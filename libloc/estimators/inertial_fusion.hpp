@@ -15,6 +15,8 @@
 // have by then (kReinitialised).
 // Rejections: a source that is gated reject_count times in a row over reject_time_s is believed again: the covariance
 // is widened by what it says (kRecovered), and if that does not help, the filter starts anew where GPS says.
+// Stamps of GPS that are off: gps_lag_watch.hpp compares the way of the fixes with that of the IMU by itself, from the
+// filter's state at the beginning of each window (kGpsStampsDoubtful).
 //
 // Not observable: heading without GPS motion, magnetometer or absolute odometry; scale without acceleration. After a
 // start in motion with odometry alone, velocity and scale can only be found together, which a linearised filter gets
@@ -31,6 +33,7 @@
 #include "libloc/estimators/estimate.hpp"
 #include "libloc/estimators/estimator.hpp"
 #include "libloc/estimators/fusion_start.hpp"
+#include "libloc/estimators/gps_lag_watch.hpp"
 #include "libloc/estimators/gps_position.hpp"
 #include "libloc/estimators/heading_bank.hpp"
 #include "libloc/estimators/stand_still.hpp"
@@ -118,6 +121,8 @@ class InertialFusion {
   const std::optional<LocalFrame>& world() const { return world_; }
   const ErrorStateFilter& filter() const { return bank_.best(); }
   const StandStillDetector& stand_still() const { return rest_; }
+  /// What the fixes say of their own stamps.
+  const GpsLagWatch& lag_watch() const { return lag_; }
   const InertialFusionOptions& options() const { return options_; }
 
  private:
@@ -153,6 +158,7 @@ class InertialFusion {
   void process_other(const Measurement& measurement);
   void fuse(const GpsMeasurement& gps);
   bool refused(GpsRefusal refusal);
+  void see_lag(const GpsPosition& fix);
   bool prepare(const GpsMeasurement& gps, GpsPosition& fix);
   void anchor(TimeNs time_ns, const Eigen::Vector3d& position, const Eigen::Matrix3d& position_cov);
   void fuse(const OdometryMeasurement& odometry);
@@ -191,6 +197,9 @@ class InertialFusion {
   bool odometry_used_ = false;
   OdometryMeasurement seen_;        // absolute pose that motion is looked for against
   TimeNs gps_before_ns_ = kNoTime;  // of the fix before this one
+  GpsLagWatch lag_;
+  ImuReckoning reckoning_;
+  bool reckoning_used_ = false;  // a fix of the window was compared with it
 
   Stamp last_;
   std::uint32_t status_ = 0;

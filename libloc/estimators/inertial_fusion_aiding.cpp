@@ -92,10 +92,32 @@ void InertialFusion::fuse(const GpsMeasurement& gps) {
     bank_.start_all_headings(filter().time_ns(), state, Eigen::MatrixXd(filter().covariance()));
   }
   gps_before_ns_ = std::max(gps_before_ns_, gps.time_ns);
+  see_lag(fix);
   take_note(bank_.fuse([&](ErrorStateFilter& one) {
     return one.fuse_gps(gps.time_ns, fix.position, fix.position_cov, options_.gps_antenna, fix.velocity,
                         fix.velocity_cov);
   }));
+}
+
+// A window's reckoning begins at the filter's state, which is of now: a fix that is late finds no place in it at first.
+void InertialFusion::see_lag(const GpsPosition& fix) {
+  if (!heading_known_ || bank_.size() != 1) {
+    lag_.break_off();
+    reckoning_.stop();
+    return;
+  }
+  if (!reckoning_.running() || (lag_.begins() && reckoning_used_)) {
+    lag_.break_off();
+    const InertialState& x = filter().state().inertial;
+    reckoning_.begin({filter().time_ns(), x.position, x.velocity, x.q_world_body}, x.gyroscope_bias,
+                     x.accelerometer_bias);
+    reckoning_used_ = false;
+  }
+  const auto point = reckoning_.at(fix.time_ns);
+  if (!point) return;
+  reckoning_used_ = true;
+  const Eigen::Vector3d antenna = point->position + point->q_world_body * options_.gps_antenna;
+  lag_.see(fix.time_ns, fix.position.head<2>(), antenna.head<2>(), point->velocity.head<2>());
 }
 
 // Moves the state to where GPS is; without a heading, in all of them.

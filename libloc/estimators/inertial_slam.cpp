@@ -545,7 +545,7 @@ void InertialSlam::take_frame(const FeaturesMeasurement& frame) {
   const SlamFrame& done = filter_.update(frame, status_ | (at_rest_ ? kAtRest : 0U));
   ++frames_used_;
   if ((done.estimate.status & kFewFeatures) == 0) last_good_frame_ns_ = filter_.time_ns();
-  frame_status_ = done.estimate.status & (kFewFeatures | kFeaturesRejected | kCalibrationDoubtful);
+  frame_status_ = done.estimate.status & (kFewFeatures | kFeaturesRejected | kCalibrationDoubtful | kMapLinkUnknown);
   status_ |= done.estimate.status & kRefound;
   recover(done);
   if (frame_count_ == frames_.size()) frames_.emplace_back();

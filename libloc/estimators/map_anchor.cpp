@@ -16,6 +16,7 @@ constexpr std::size_t kMostWaiting = 64;  // fixes
 constexpr double kDriftEvery = 0.1;       // way for which the drift is added [m]
 constexpr double kHeadingDoubt = 0.1;     // after fixes were rejected [rad]
 constexpr double kScaleDoubt = 0.1;       // relative
+constexpr double kNewScaleDoubt = 0.5;    // of a camera alone in new surroundings, relative
 constexpr int kWidenMost = 2;             // times, then it starts anew
 constexpr int kToldAfter = 3;             // rejections in a row
 constexpr std::uint32_t kPoseIsGuess = kLost | kFewFeatures | kNoImages | kGap | kBridged;
@@ -81,6 +82,7 @@ MapAnchor::MapAnchor(const MapAnchorOptions& options)
       gate_2_(chi_square_quantile(options.gate_probability, 2)),
       gate_3_(chi_square_quantile(options.gate_probability, 3)),
       covariance_(Eigen::MatrixXd::Zero(kAnchorDim, kAnchorDim)),
+      lag_({.drift_order = 1, .scale_known = options.scale_known}),
       correction_(Eigen::VectorXd::Zero(kAnchorDim)) {
   if (options.origin) world_.emplace(*options.origin);
 }
@@ -90,6 +92,7 @@ void MapAnchor::reset() {
   if (!options_.origin) world_.reset();
   while (!waiting_.empty()) waiting_.drop_front();
   before_ns_ = newest_gps_ns_ = last_good_ns_ = kNoTime;
+  lag_.reset();
   status_ = 0;
 }
 
@@ -103,9 +106,11 @@ void MapAnchor::forget_map() {
   way_ = 0;
   while (!history_.empty()) history_.drop_front();
   pairs_.clear();
+  lag_.break_off();
   rejected_in_a_row_ = widened_ = 0;
   rejected_since_ns_ = kNoTime;
   lost_ = false;
+  linked_ = true;
   before_.reset();
   good_position_variance_ = good_heading_variance_ = kUnknown;
   grown_position_ = grown_heading_ = 0;
@@ -122,6 +127,7 @@ std::uint32_t MapAnchor::take_status() {
   const bool outage = last_good_ns_ == kNoTime || last_.time_ns == kNoTime ||
                       to_seconds(last_.time_ns - last_good_ns_) > options_.outage_s;
   if (!anchored_ || outage) status |= kNoGps;
+  if (lag_.doubtful()) status |= kGpsStampsDoubtful;
   return status;
 }
 
@@ -138,9 +144,13 @@ void MapAnchor::move(const Estimate& in_map) {
   }
   if (last_.time_ns == kNoTime) forget_foreign_fixes(in_map.time_ns);
   const bool guess = (in_map.status & kPoseIsGuess) != 0;
+  const bool linked = (in_map.status & kMapLinkUnknown) == 0;
+  const bool linked_again = linked && !std::exchange(linked_, linked);
   const bool found = std::exchange(lost_, guess) && !guess && before_;
-  carry(in_map, found);
-  if (found) find_back();
+  if (guess || found || linked_again) lag_.break_off();
+  carry(in_map, (found && linked) || linked_again);
+  if (found && linked) find_back();
+  if (found && !linked) go_on_elsewhere();
   see_doubt(in_map);
   const bool keep = history_.empty() || last_.time_ns - history_.back().time_ns >= kPoseEvery;
   if (keep) history_.push_back(last_);
@@ -263,6 +273,14 @@ void MapAnchor::find_back() {
   drift(by_map.scale * way.norm());
 }
 
+// It goes on in surroundings that are new to the map: the place is that of the guess, and the unit of a camera alone is
+// another one.
+void MapAnchor::go_on_elsewhere() {
+  before_.reset();
+  ++counts_["anchor.went_on_elsewhere"];
+  if (anchored_ && !options_.scale_known) covariance_(kAnchorScale, kAnchorScale) += square(kNewScaleDoubt);
+}
+
 bool MapAnchor::refused(GpsRefusal refusal) {
   if (refusal == GpsRefusal::kNone) return false;
   const GpsRefusalNote note = note_of(refusal);
@@ -376,6 +394,7 @@ void MapAnchor::take(const GpsPosition& received, const Pose& pose) {
   }
   if (!anchored_ || searching_) look_for_start();
   if (!anchored_ || begun_ns_ == fix.time_ns) return;
+  if (!lost_) see_lag(fix, pose);
   const Eigen::Vector3d lag = to_world(last_.position - pose.position);
   const Eigen::Vector3d arm = x_.q_world_map * lever;
   const Eigen::Vector3d residual = fix.position - (x_.position - lag + arm);
@@ -398,6 +417,19 @@ void MapAnchor::take(const GpsPosition& received, const Pose& pose) {
   J << Eigen::Matrix3d::Zero(), -so3::hat(of_body + by_turning), of_body;
   const bool good = update(fix.velocity - of_body - by_turning, J, fix.velocity_cov, 3);
   ++counts_[good ? "gps_velocity.accepted" : "gps_velocity.rejected"];
+}
+
+// The way in the map by a transform that fixes do not change while a window lasts.
+void MapAnchor::see_lag(const GpsPosition& fix, const Pose& pose) {
+  const Eigen::Matrix3d turn = x_.q_world_map.toRotationMatrix();
+  if (lag_.begins()) {
+    lag_to_world_ = x_.scale * turn;
+    lag_from_ = pose.position;
+  }
+  const Eigen::Vector3d way =
+      lag_to_world_ * (pose.position - lag_from_) + turn * (pose.rotation * options_.gps_antenna);
+  const Eigen::Vector3d velocity = lag_to_world_ * pose.velocity;
+  lag_.see(fix.time_ns, fix.position.head<2>(), way.head<2>(), velocity.head<2>());
 }
 
 bool MapAnchor::update(const Eigen::Vector3d& residual, const Jacobian& J, const Eigen::Matrix3d& cov, int rows) {
@@ -556,6 +588,7 @@ void MapAnchor::put_in_world(SlamMapPoint& point) const {
 NamedCounts MapAnchor::counts() const {
   NamedCounts out;
   for (const auto& [name, value] : counts_) out.push_back({name, value});
+  if (lag_.doubtful()) out.push_back({"stamps.gps_to_add_ms", std::llround(1e3 * lag_.offset_s())});
   return out;
 }
 

@@ -12,8 +12,11 @@
 // the way gone tells the heading) poses stay as they are in the map.
 // Outages: the map carries on, with the uncertainty that it drifts by. Outliers: gate; a receiver that is rejected for
 // long is believed again, first by a wider covariance, then by a new start (kRecovered, kReinitialised).
-// Late fixes: up to history_s; a fix ahead of the last pose waits for the next one. Fixes must come roughly in order.
-// Lost and found again: if fixes came in the meantime the place they gave is kept, otherwise the map's.
+// Stamps of GPS that are off: gps_lag_watch.hpp compares the way of the fixes with that in the map
+// (kGpsStampsDoubtful). Late fixes: up to history_s; a fix ahead of the last pose waits for the next one. Fixes must
+// come roughly in order. Lost and found again: if fixes came in the meantime the place they gave is kept, otherwise the
+// map's. Lost and gone on in new surroundings (kMapLinkUnknown): place and scale are those of a guess, which fixes
+// correct.
 //
 // Not observable: heading while the body stands still; scale and tilt of a camera's map from a straight way (the tilt
 // is taken to be upright, within tilt_sigma).
@@ -28,6 +31,7 @@
 #include "libloc/core/fifo.hpp"
 #include "libloc/core/named_count.hpp"
 #include "libloc/estimators/estimate.hpp"
+#include "libloc/estimators/gps_lag_watch.hpp"
 #include "libloc/estimators/gps_position.hpp"
 #include "libloc/estimators/map_anchor_start.hpp"
 #include "libloc/estimators/slam_frame.hpp"
@@ -99,6 +103,8 @@ class MapAnchor {
   void put_in_world(SlamFrame& frame) const;
   void put_in_world(SlamMapPoint& point) const;
 
+  /// What the fixes say of their own stamps.
+  const GpsLagWatch& lag_watch() const { return lag_; }
   /// EstimateStatus of what happened since the last call.
   std::uint32_t take_status();
   NamedCounts counts() const;
@@ -128,10 +134,12 @@ class MapAnchor {
   void drift(double way);
   void see_doubt(const Estimate& in_map);
   void find_back();
+  void go_on_elsewhere();
   void forget_foreign_fixes(TimeNs time_ns);
   void take_waiting();
   std::optional<Pose> pose_at(TimeNs time_ns) const;
   void take(const GpsPosition& received, const Pose& pose);
+  void see_lag(const GpsPosition& fix, const Pose& pose);
   bool update(const Eigen::Vector3d& residual, const Jacobian& J, const Eigen::Matrix3d& cov, int rows);
   void doubt(TimeNs time_ns, const Eigen::Vector3d& residual);
   void look_for_start();
@@ -159,7 +167,10 @@ class MapAnchor {
   Fifo<Pose> history_;
   Fifo<GpsPosition> waiting_;      // for poses
   std::vector<AnchorPair> pairs_;  // for a start
-  TimeNs before_ns_ = kNoTime;     // of the fix before
+  GpsLagWatch lag_;
+  Eigen::Matrix3d lag_to_world_ = Eigen::Matrix3d::Identity();  // map to world, as it was when its window began
+  Eigen::Vector3d lag_from_ = Eigen::Vector3d::Zero();          // place in the map then
+  TimeNs before_ns_ = kNoTime;                                  // of the fix before
   TimeNs newest_gps_ns_ = kNoTime;
   TimeNs last_good_ns_ = kNoTime;  // fix
   int rejected_in_a_row_ = 0;
@@ -168,6 +179,7 @@ class MapAnchor {
   std::int64_t accepted_ = 0;
 
   bool lost_ = false;
+  bool linked_ = true;            // what is seen now, to the map from before
   std::optional<Before> before_;  // it got lost
   double good_position_variance_ = kUnknown;
   double good_heading_variance_ = kUnknown;

@@ -41,15 +41,16 @@ void MonoSlam::restore(const SlamSnapshot& snapshot) {
   restored_ = true;
 }
 
-// What the body did meanwhile is known no better than at the start.
+// What the body did meanwhile is known no better than at the start, or than its usual speed allows.
 void MonoSlam::widen_after_gap(double pause_s) {
   pause_s = std::min(pause_s, kLongestPause);
   const SlamOptions& options = filter_.options();
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(filter_.layout().dim);
   const auto add = [&](int first, double sigma) { variance.segment<3>(first).array() += sigma * sigma; };
-  add(kVelocity, options.sigma_velocity);
+  const double sigma_velocity = filter_.unknown_velocity_sigma();
+  add(kVelocity, sigma_velocity);
   add(kAngularVelocity, options.sigma_angular_velocity);
-  add(kPosition, options.sigma_velocity * pause_s);
+  add(kPosition, sigma_velocity * pause_s);
   add(kTheta, std::min(options.sigma_angular_velocity * pause_s, 3.0));
   filter_.widen(variance);
 }

@@ -222,6 +222,7 @@ const SlamFrame& SlamFilter::update(const FeaturesMeasurement& frame, std::uint3
   if (watch_.doubtful()) frame_.estimate.status |= kCalibrationDoubtful;
   if (lost_) frame_.estimate.status |= kLost;
   if (refound_) frame_.estimate.status |= kRefound;
+  if (left_frame_ >= 0) frame_.estimate.status |= kMapLinkUnknown;
   frame_.time_spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return frame_;
 }

@@ -13,7 +13,11 @@
 //   6. a frame is found in the map when enough features of it that were there before agree. After lost_after_s of
 //      frames that are not it is lost (kLost): a few that agree by chance then change nothing, and for relocate_s of
 //      frames with something in them nothing is added, while the front end looks for the map. What finds it then says
-//      kRefound once; if nothing does, it goes on in surroundings that are new, with the covariance of its guess.
+//      kRefound once; if nothing does, it goes on in surroundings that are new, with the covariance of its guess, and
+//      says so (kMapLinkUnknown) until it finds something from before.
+//      A camera alone that is lost has the pose of a body that goes on as it did. Since it was last found it may as
+//      well have stopped, turned or gone twice as fast: the velocity gets the variance of the speed that was usual (of
+//      the start's velocity at least), and the place what that makes in the time gone.
 //   7. features that are well known become XYZ, those that are expected and not found are deleted, new ones are added
 //      where the picture is empty
 // There is no initialisation phase: a feature counts from the first frame on, its depth is unknown within the prior.
@@ -113,8 +117,10 @@ class SlamFilter {
   /// The same when it is not known what happened meanwhile: lost, not valid.
   void predict_lost(TimeNs time_ns, SlamPrediction& out) const;
   /// No frame for too long, says who knows the time.
-  void lose() { lost_ = lost_ || found_frame_ >= 0; }
+  void lose();
   bool lost() const { return lost_; }
+  /// Of one coordinate of the velocity when nothing is known of the motion: that of the start, or what is usual here.
+  double unknown_velocity_sigma() const;
 
   /// The body does not move: v = 0, and with an IMU the mean rate is the gyroscope's bias.
   /// @param rate as measured, bias not removed [rad/s] @returns false when the filter knows better (gate).
@@ -170,6 +176,7 @@ class SlamFilter {
 
   // slam_filter_locate.cpp
   void locate(const FeaturesMeasurement& frame);
+  void doubt_motion();
   bool looks_for_map() const;
   int fewest_to_find() const;
   void forget_location();
@@ -187,7 +194,7 @@ class SlamFilter {
   void make_room(int wanted);
   void remove_marked();
   bool add_landmark(const FeatureObservation& observation, double inverse_depth, double sigma);
-  double usual_inverse_depth() const;
+  double usual_inverse_depth();
   void add_known_landmarks();
 
   bool is_placed(const SlamLandmark& landmark) const;
@@ -242,6 +249,10 @@ class SlamFilter {
   bool lost_ = false;               // none for too long
   bool refound_ = false;            // by the frame at hand
   std::int64_t found_frame_ = -1;   // the last one that was; -1: none yet
+  std::int64_t left_frame_ = -1;    // the last one of the map that it has left for new surroundings; -1: none
+  double usual_speed_ = 0;          // while found [unit/s]
+  double usual_log_inverse_depth_ = kUnknown;  // of what was seen lately
+  TimeNs usual_depth_ns_ = kNoTime;
   TimeNs found_ns_ = kNoTime;       // its time
   TimeNs last_frame_ns_ = kNoTime;  // of any frame
   double strange_s_ = 0;            // for so long frames have shown something else

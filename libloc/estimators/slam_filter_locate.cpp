@@ -19,6 +19,7 @@ constexpr int kFewestHidden = 4;    // at once, below a cover
 constexpr double kSudden = 0.5;     // for so long: what they have in common came at once [s]
 constexpr double kHiddenPart = 0.25;  // of those that are expected
 constexpr double kCoverTime = 1;      // after which it may have gone [s]
+constexpr double kSpeedTime = 2;      // over which the usual speed is averaged [s]
 
 }  // namespace
 
@@ -37,7 +38,32 @@ void SlamFilter::forget_location() {
   lost_ = refound_ = false;
   found_frame_ = -1;
   found_ns_ = last_frame_ns_ = cover_ns_ = kNoTime;
-  strange_s_ = usually_found_ = 0;
+  strange_s_ = usually_found_ = usual_speed_ = 0;
+  left_frame_ = -1;
+  usual_log_inverse_depth_ = kUnknown;
+  usual_depth_ns_ = kNoTime;
+}
+
+void SlamFilter::lose() {
+  lost_ = lost_ || found_frame_ >= 0;
+}
+
+// P of place and velocity grows as of a body that has had an unknown velocity since it was last found: less than the
+// model's own acceleration makes of a camera that rests, more of one that drives.
+void SlamFilter::doubt_motion() {
+  const double since = to_seconds(time_ns_ - found_ns_);
+  const double variance = unknown_velocity_sigma() * unknown_velocity_sigma();
+  Eigen::MatrixXd q = Eigen::MatrixXd::Zero(layout_.dim, layout_.dim);
+  for (int i = 0; i < 3; ++i) {
+    q(kVelocity + i, kVelocity + i) = variance;
+    q(kPosition + i, kPosition + i) = variance * since * since;
+    q(kPosition + i, kVelocity + i) = q(kVelocity + i, kPosition + i) = variance * since;
+  }
+  covariance_.propagate(Eigen::MatrixXd::Identity(layout_.dim, layout_.dim), q);
+}
+
+double SlamFilter::unknown_velocity_sigma() const {
+  return std::max(options_.sigma_velocity, usual_speed_ / std::sqrt(3.0));
 }
 
 // Is the frame one of this map?
@@ -45,11 +71,13 @@ void SlamFilter::locate(const FeaturesMeasurement& frame) {
   int old = 0;  // that were there when the last frame was found
   int young = 0;
   int old_rejected = 0;
+  int of_map_left = 0;
   for (const SlamLandmark& landmark : landmarks_) {
     const bool measured = landmark.state == SlamFeatureState::kMeasured || landmark.state == SlamFeatureState::kRescued;
     const bool is_old = landmark.first_frame <= found_frame_;
     if (is_old && landmark.observation >= 0 && landmark.state == SlamFeatureState::kRejected) ++old_rejected;
     if (measured) ++(is_old ? old : young);
+    if (measured && left_frame_ >= 0 && landmark.first_frame <= left_frame_) ++of_map_left;
   }
   refound_ = false;
   const double since = last_frame_ns_ == kNoTime ? 0 : std::max(0.0, to_seconds(time_ns_ - last_frame_ns_));
@@ -61,9 +89,17 @@ void SlamFilter::locate(const FeaturesMeasurement& frame) {
   const bool by_all = old + young >= kFewestFound && !looks_for_map();
   found_ = by_old || by_all || !began;
   if (by_old || by_all) {
-    refound_ = lost_ && by_old;
+    const bool linked = left_frame_ >= 0 && of_map_left >= fewest_to_find();
+    if (linked) left_frame_ = -1;
+    refound_ = (lost_ && by_old) || linked;
     if (refound_) ++times_refound_;
-    if (lost_ && !by_old) ++times_gone_on_;
+    if (lost_ && !by_old) {
+      ++times_gone_on_;
+      if (left_frame_ < 0) left_frame_ = found_frame_;
+    }
+    const double speed = state_.velocity.norm();
+    const double part = found_frame_ < 0 ? 1 : std::min(1.0, since / kSpeedTime);
+    usual_speed_ = std::hypot(std::sqrt(1 - part) * usual_speed_, std::sqrt(part) * speed);
     lost_ = false;
     found_frame_ = frames_;
     found_ns_ = time_ns_;
@@ -75,7 +111,10 @@ void SlamFilter::locate(const FeaturesMeasurement& frame) {
   if (static_cast<int>(frame.features.size()) >= kFewestRefound) {
     strange_s_ += std::min(since, options_.lost_after_s);  // what a pause hid was not seen
   }
-  lost_ = lost_ || to_seconds(time_ns_ - found_ns_) > options_.lost_after_s;
+  if (!lost_ && to_seconds(time_ns_ - found_ns_) > options_.lost_after_s) {
+    lost_ = true;
+    if (!layout_.inertial) doubt_motion();
+  }
   if (lost_) ++lost_frames_;
 }
 
@@ -91,8 +130,9 @@ bool SlamFilter::is_hidden(const SlamLandmark& landmark, double lately_s) const 
 
 // Most of what is known around that place is hidden.
 bool SlamFilter::is_covered(const Eigen::Vector2d& pixel_px) const {
-  if (options_.map.cover_radius_px <= 0) return false;
-  const double farthest = options_.map.cover_radius_px * options_.map.cover_radius_px;
+  if (options_.map.cover_radius <= 0) return false;
+  const double radius_px = options_.map.cover_radius * options_.camera.width_px;
+  const double farthest = radius_px * radius_px;
   int hidden = 0;
   int seen = 0;
   for (const SlamLandmark& landmark : landmarks_) {

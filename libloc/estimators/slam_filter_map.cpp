@@ -8,9 +8,11 @@
 namespace loc {
 namespace {
 
-constexpr std::size_t kFewDepths = 5;  // fewer known depths say nothing about the others
-constexpr double kKnownDepth = 0.3;    // relative deviation of a depth that counts as known
-constexpr double kBehindSigmas = 3;    // so far below zero an inverse depth is an error, not noise
+constexpr std::size_t kFewDepths = 5;   // fewer known depths say nothing about the others
+constexpr double kDepthTime = 1.5;      // over which the usual depth is averaged [s]
+constexpr double kMostDepthPart = 0.1;  // of one frame in it
+constexpr double kKnownDepth = 0.3;     // relative deviation of a depth that counts as known
+constexpr double kBehindSigmas = 3;     // so far below zero an inverse depth is an error, not noise
 
 }  // namespace
 
@@ -96,10 +98,15 @@ void SlamFilter::convert_landmarks() {
   covariance_.remove(ranges_);
 }
 
-double SlamFilter::usual_inverse_depth() const {
+// The median of what is known. A camera alone averages that of what it sees over time: what is known best is not what
+// comes next (on a road it is far away), and its unit of lengths hangs on it; with an IMU, which makes metres of it,
+// the latest is the best. Where nothing of what is known is seen, as after the camera was lost, what was usual counts:
+// surroundings stay of one size.
+double SlamFilter::usual_inverse_depth() {
   depths_.clear();
   for (const SlamLandmark& landmark : landmarks_) {
-    if (!landmark.visible) continue;
+    const bool seen = landmark.last_measured_frame == frames_ && landmark.first_frame < frames_;
+    if (!(layout_.inertial ? landmark.visible : seen)) continue;
     if (landmark.point.converted) {
       depths_.push_back(1 / (landmark.point.position - frame_.camera_position).norm());
       continue;
@@ -108,10 +115,16 @@ double SlamFilter::usual_inverse_depth() const {
     const double rho = landmark.point.inverse_depth.inverse_depth;
     if (std::sqrt(std::max(0.0, covariance_(at, at))) < kKnownDepth * rho) depths_.push_back(rho);
   }
-  if (depths_.size() < kFewDepths) return kUnknown;
+  const bool sees = frame_.counts.measured >= static_cast<std::int64_t>(kFewDepths);
+  if (depths_.size() < kFewDepths || !sees) return std::exp(usual_log_inverse_depth_);  // NaN: none yet
   const auto middle = depths_.begin() + static_cast<std::ptrdiff_t>(depths_.size() / 2);
   std::nth_element(depths_.begin(), middle, depths_.end());
-  return *middle;
+  const double now = std::log(*middle);
+  if (usual_depth_ns_ == kNoTime) usual_log_inverse_depth_ = now;
+  const double since = usual_depth_ns_ == kNoTime ? 0 : std::abs(apart_s(time_ns_, usual_depth_ns_));
+  usual_log_inverse_depth_ += std::min(since / kDepthTime, kMostDepthPart) * (now - usual_log_inverse_depth_);
+  usual_depth_ns_ = time_ns_;
+  return layout_.inertial ? *middle : std::exp(usual_log_inverse_depth_);
 }
 
 bool SlamFilter::add_landmark(const FeatureObservation& observation, double inverse_depth, double sigma) {

@@ -40,7 +40,7 @@ void SlamMapOptions::check() const {
   require(min_visible <= max_features, "map.min_visible", min_visible, "must not be above map.max_features");
   require_at_least("map.max_added", max_added, 1);
   require_at_least("map.steer_after_frames", steer_after_frames, 0);
-  require(cover_radius_px >= 0, "map.cover_radius_px", cover_radius_px, "must not be negative");
+  require(cover_radius >= 0 && cover_radius <= 1, "map.cover_radius", cover_radius, "must be from 0 to 1");
   require_at_least("map.grid_columns", grid_columns, 1);
   require_at_least("map.grid_rows", grid_rows, 1);
   require(grid_columns <= 1000 && grid_rows <= 1000, "map.grid_columns and map.grid_rows must be at most 1000");
@@ -120,6 +120,19 @@ void SlamOptions::check() const {
     require_not_negative(name + ".sigma", landmark.sigma);
     require(ids.insert(landmark.id).second, name + ".id", static_cast<double>(landmark.id), "comes twice");
   }
+}
+
+SlamOptions slam_options_for_images(SlamOptions options) {
+  options.sigma_px = 1;
+  options.map.max_linearity_index = 0.03;
+  options.second_order_noise = options.motion == SlamMotion::kConstantVelocity;
+  options.relocate_s = 2;
+  if (options.motion == SlamMotion::kConstantVelocity) {
+    // Where nothing but the picture tells what moves.
+    options.map.steer_after_frames = 20;
+    options.map.cover_radius = 0.09;
+  }
+  return options;
 }
 
 }  // namespace loc

@@ -60,15 +60,15 @@ struct SlamMapOptions {
   double border_px = 2;               ///< predicted nearer to the border: not expected to be seen
   double inverse_depth = 0.3;         ///< of a new feature (rho_0) [1/m]
   double sigma_inverse_depth = 0.2;   ///< its deviation (sigma_rho); 0 must lie within 2 sigma [1/m]
-  bool depth_from_neighbours = true;  ///< rho_0 of a new feature is the median of those that are known; its deviation
-                                      ///< grows with it
+  bool depth_from_neighbours = true;  ///< rho_0 of a new feature is the median of those that are known, over the last
+                                      ///< seconds; its deviation grows with it
   double max_linearity_index = 0.07;  ///< below it a feature becomes XYZ (inverse_depth.hpp); 0: never
   /// While something hides many features at once, younger ones than that are estimated but move nothing else, if there
   /// are enough older ones: what moves by itself is found out before it spoils the pose. 0: off
   int steer_after_frames = 0;
   /// Nothing joins the map so near to features that are expected but hidden, where most are, and they stay in the map
-  /// for a while: what came before them may move on. 0: off [px]
-  double cover_radius_px = 0;
+  /// for a while: what came before them may move on. A share of the picture's width; 0: off [1]
+  double cover_radius = 0;
   int delete_after_tries = 10;      ///< frames in which it was expected, before it is judged
   double delete_below_ratio = 0.5;  ///< measured in less than this share of them: deleted
 
@@ -171,5 +171,11 @@ struct SlamOptions {
   /// @throws std::invalid_argument naming the field and its value.
   void check() const;
 };
+
+/// Settings for tracks of FeatureTracker (vision), where they differ from the general ones: pixels as good as the
+/// tracker says by default (for search ellipses), features that stay inverse depth for longer, and for a camera alone
+/// the noise of second order, since pictures may begin in a turn, and care with what appears where something hides the
+/// map. FeatureTracker looks for the map where it was lost. Depends on options.motion alone.
+SlamOptions slam_options_for_images(SlamOptions options);
 
 }  // namespace loc

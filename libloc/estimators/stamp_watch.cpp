@@ -24,8 +24,21 @@ constexpr double kUnique = 0.05;         // than at offsets that are further awa
 constexpr TimeNs kNear = 400'000'000;
 constexpr double kLeastOffset = 0.05;  // that is called a doubt [s]
 constexpr double kSame = 0.1;          // two judgements in a row [s]
+constexpr double kLeastFine = 0.02;    // the same, of the offset by least squares, …
+constexpr double kFineSigmas = 5;      // … which is so far from zero
+constexpr double kSameFine = 0.015;    // two judgements in a row [s]
+constexpr double kAgree = 0.03;        // with the best correlation [s]
+constexpr int kFineInARow = 3;
+constexpr double kWellKnown = 0.01;  // deviation with which it is better than the best correlation [s]
+constexpr double kMostStep = 0.05;   // of an iteration [s]
+constexpr double kMostCorrelation = 0.98;
+constexpr int kPasses = 5;
 
 }  // namespace
+
+double StampWatch::offset_s() const {
+  return sigma_s_ <= kWellKnown && std::abs(fine_s_ - offset_s_) <= kAgree ? fine_s_ : offset_s_;
+}
 
 StampWatch::StampWatch(const CameraCalibration& camera)
     : camera_(camera),
@@ -42,7 +55,8 @@ void StampWatch::reset() {
   grid_ns_ = imu_ns_ = frame_ns_ = judged_ns_ = kNoTime;
   angle_.setZero();
   last_.clear();
-  before_s_ = offset_s_ = correlation_ = kUnknown;
+  before_s_ = offset_s_ = correlation_ = fine_s_ = sigma_s_ = kUnknown;
+  fine_in_a_row_ = 0;
   doubtful_ = false;
 }
 
@@ -158,6 +172,80 @@ bool StampWatch::correlate(TimeNs shift_ns, std::size_t from, std::size_t to, do
   return true;
 }
 
+// Least squares about an offset: rate of the camera = G g(t + d) + b, with a matrix G for what the way of the camera
+// adds in step with turning, linear in d. The deviation is that of what is left, widened by its correlation in time:
+// the way adds more than that, and slowly.
+bool StampWatch::refine(std::size_t from, std::size_t to) {
+  constexpr int kColumns = 13;
+  constexpr double kH = 0.005;  // for the rate's derivative [s]
+  using Normal = Eigen::Matrix<double, kColumns, kColumns>;
+  using Vector = Eigen::Matrix<double, kColumns, 1>;
+  using Rows = Eigen::Matrix<double, 3, kColumns>;
+  const auto rate_at = [&](const Turn& turn, double shift_s, Eigen::Vector3d& rate) {
+    Eigen::Vector3d begin;
+    Eigen::Vector3d end;
+    const TimeNs shift = from_seconds(shift_s);
+    if (!angle_at(turn.begin_ns + shift, begin) || !angle_at(turn.end_ns + shift, end)) return false;
+    rate = (end - begin) / to_seconds(turn.end_ns - turn.begin_ns);
+    return true;
+  };
+  const auto rows_of = [&](const Turn& turn, double shift_s, Rows& rows) {
+    Eigen::Vector3d now;
+    Eigen::Vector3d after;
+    Eigen::Vector3d before;
+    if (!rate_at(turn, shift_s, now) || !rate_at(turn, shift_s + kH, after) || !rate_at(turn, shift_s - kH, before)) {
+      return false;
+    }
+    rows.setZero();
+    for (int k = 0; k < 3; ++k) rows.block<1, 3>(k, 3 * k) = now.transpose();
+    rows.block<3, 3>(0, 9).setIdentity();
+    rows.col(kColumns - 1) = (after - before) / (2 * kH);
+    return true;
+  };
+  double d = offset_s_;
+  double sigma = kUnknown;
+  double c = 0;
+  Rows rows;
+  Rows before = Rows::Zero();
+  for (int pass = 0; pass < kPasses; ++pass) {
+    Normal normal = Normal::Zero();
+    Vector right = Vector::Zero();
+    for (std::size_t i = from; i < to; ++i) {
+      if (!rows_of(turns_[i], d, rows)) return false;
+      if (i > from) {
+        const Rows white = rows - c * before;
+        normal += white.transpose() * white;
+        right += white.transpose() * (turns_[i].rate - c * turns_[i - 1].rate);
+      }
+      before = rows;
+    }
+    const Eigen::LDLT<Normal> solver(normal);
+    const Vector x = solver.solve(right);
+    double squares = 0;
+    double white_squares = 0;
+    double products = 0;
+    Eigen::Vector3d last = Eigen::Vector3d::Zero();
+    for (std::size_t i = from; i < to; ++i) {
+      rows_of(turns_[i], d, rows);
+      const Eigen::Vector3d left = turns_[i].rate - rows * x;
+      if (i > from) {
+        squares += last.squaredNorm();
+        white_squares += (left - c * last).squaredNorm();
+        products += left.dot(last);
+      }
+      last = left;
+    }
+    const double variance = white_squares / (3 * static_cast<double>(to - from - 1) - kColumns);
+    sigma = std::sqrt(variance * Vector(solver.solve(Vector::Unit(kColumns - 1)))[kColumns - 1]);
+    d += std::clamp(x[kColumns - 1], -kMostStep, kMostStep);
+    if (!std::isfinite(d) || !std::isfinite(sigma)) return false;
+    c = std::clamp(squares > 0 ? products / squares : 0, 0.0, kMostCorrelation);
+  }
+  fine_s_ = d;
+  sigma_s_ = sigma;
+  return true;
+}
+
 void StampWatch::judge() {
   // The turns for which the gyroscope is known at every offset.
   std::size_t from = 0;
@@ -186,10 +274,22 @@ void StampWatch::judge() {
   if (best.second < kLeastCorrelation || at_border || !unique) return;  // says nothing; what was said stays
   const double offset = to_seconds(best.first);
   const bool wrong = std::abs(offset) >= kLeastOffset && best.second - at_zero->second >= kClearlyBetter;
-  doubtful_ = wrong && std::abs(offset - before_s_) <= kSame;
+  const bool surely = wrong && std::abs(offset - before_s_) <= kSame;
   before_s_ = wrong ? offset : kUnknown;
   offset_s_ = offset;
   correlation_ = best.second;
+  const double fine_before = fine_s_;
+  if (!refine(from, to)) {
+    fine_s_ = sigma_s_ = kUnknown;
+    fine_in_a_row_ = 0;
+  }
+  const bool agree = sigma_s_ <= kWellKnown && std::abs(fine_s_ - offset) <= kAgree;
+  if (!agree || std::abs(fine_s_) < kLeastFine || std::abs(fine_s_) < kFineSigmas * sigma_s_) {
+    fine_in_a_row_ = 0;
+  } else {
+    fine_in_a_row_ = fine_in_a_row_ > 0 && std::abs(fine_s_ - fine_before) <= kSameFine ? fine_in_a_row_ + 1 : 1;
+  }
+  doubtful_ = surely || fine_in_a_row_ >= kFineInARow;
 }
 
 }  // namespace loc

@@ -13,11 +13,6 @@ constexpr double kFollow = 0.1;  // of an interval, to the usual one
 constexpr double kFarthest =
     5;  // a sample further back is another time line; further ahead, a second one must agree [s]
 
-// a - b, of any times; exact to a microsecond.
-double apart_s(TimeNs a, TimeNs b) {
-  return 1e-9 * (static_cast<double>(a) - static_cast<double>(b));
-}
-
 }  // namespace
 
 StreamWatch::StreamWatch(StreamWatchOptions options)

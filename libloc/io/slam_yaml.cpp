@@ -45,7 +45,7 @@ void visit_fields(Visitor& v, Options& o) requires std::is_same_v<std::remove_co
   v.field("min_visible", o.min_visible);
   v.field("max_added", o.max_added);
   v.field("steer_after_frames", o.steer_after_frames);
-  v.field("cover_radius_px", o.cover_radius_px);
+  v.field("cover_radius", o.cover_radius);
   v.field("grid_columns", o.grid_columns);
   v.field("grid_rows", o.grid_rows);
   v.field("min_separation_px", o.min_separation_px);

@@ -1,7 +1,7 @@
 // SLAM from pictures: a front end (feature_tracker.hpp) and an estimator (mono_slam.hpp, inertial_slam.hpp) that tells
 // it where to look. The estimator itself sees tracks, never a picture.
 //
-//   ImageSlam<InertialSlam> slam(options);
+//   ImageSlam<InertialSlam> slam(slam_options_for_images(options));
 //   for (const Measurement& m : measurements) slam.process(m);    // pictures, IMU, in the order of their times
 #pragma once
 
@@ -11,23 +11,6 @@
 #include "libloc/vision/feature_tracker.hpp"
 
 namespace loc {
-
-/// Settings of the filter for tracks of FeatureTracker, where they differ from the general ones: pixels as good as the
-/// tracker says by default (for search ellipses), features that stay inverse depth for longer, and for a camera alone
-/// the noise of second order, since pictures may begin in a turn, and care with what appears where something hides the
-/// map. FeatureTracker looks for the map where it was lost.
-inline SlamOptions slam_options_for_images(SlamOptions options) {
-  options.sigma_px = 1;
-  options.map.max_linearity_index = 0.03;
-  options.second_order_noise = options.motion == SlamMotion::kConstantVelocity;
-  options.relocate_s = 2;
-  if (options.motion == SlamMotion::kConstantVelocity) {
-    // Where nothing but the picture tells what moves.
-    options.map.steer_after_frames = 20;
-    options.map.cover_radius_px = 0.09 * options.camera.width_px;
-  }
-  return options;
-}
 
 /// A tracker gives identities of its own, which are nobody's that is known beforehand.
 /// @throws std::invalid_argument for options with landmarks.

@@ -337,6 +337,8 @@ void bind_estimate(py::module_& m) {
       .value("CALIBRATION_DOUBTFUL", loc::kCalibrationDoubtful)
       .value("TILT_DOUBTFUL", loc::kTiltDoubtful)
       .value("STAMPS_DOUBTFUL", loc::kStampsDoubtful)
+      .value("MAP_LINK_UNKNOWN", loc::kMapLinkUnknown)
+      .value("GPS_STAMPS_DOUBTFUL", loc::kGpsStampsDoubtful)
       .finalize();
   using loc::Estimate;
   py::class_<Estimate>(m, "Estimate", "What an estimator says after one measurement.")

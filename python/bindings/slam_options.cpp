@@ -54,9 +54,9 @@ void bind_map_options(py::module_& m) {
       .def_readwrite("steer_after_frames", &O::steer_after_frames,
                      "While something hides many features at once, younger ones than that are estimated but move "
                      "nothing else. 0: off.")
-      .def_readwrite("cover_radius_px", &O::cover_radius_px,
+      .def_readwrite("cover_radius", &O::cover_radius,
                      "Nothing joins the map so near to features that are expected but hidden, and they stay in it for "
-                     "a while. 0: off [px].")
+                     "a while. A share of the picture's width; 0: off.")
       .def_readwrite("grid_columns", &O::grid_columns, "The picture's cells, over which new features are spread.")
       .def_readwrite("grid_rows", &O::grid_rows, "The same.")
       .def_readwrite("min_separation_px", &O::min_separation_px, "Of a new feature from those in the map [px].")

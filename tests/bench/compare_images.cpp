@@ -5,10 +5,12 @@
 //     --seeds=N        so many worlds and noises, a line each (default 1)
 //     --only=TEXT      only lines with that in "world: case: who", such as "street", "black", "alone"
 // Columns: ATE, of the pictures after which it was not lost (aligned by them); their largest error; that of the last
-// second and a half; the largest error while it was lost, by what it said itself to be off (deviation of the place);
-// pictures after which it was lost, and times that it found itself again; pictures with too few features, pictures
-// after which the filter took the motion for unknown or began anew; tracks found out as moving, and found again; mean
-// time of a picture, and the longest.
+// second and a half; the largest error while it was lost, by what it said itself to be off (deviation of the place),
+// and by how many of its deviations it was off at most until it was found again, aligned by the pictures before it got
+// lost; pictures after which it was lost, and times that it found itself again; pictures in new surroundings, of which
+// it says that it does not know where they are; pictures with too few features, pictures after which the filter took
+// the motion for unknown or began anew; tracks found out as moving, and found again; mean time of a picture, and the
+// longest.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -231,17 +233,35 @@ void report(const char* who, const Run& run, std::size_t pictures, const Traject
   for (std::size_t i = 0; i < error.times_ns.size(); ++i) {
     if (to_seconds(error.times_ns.back() - error.times_ns[i]) < kLastS) last = std::max(last, error.translation_m[i]);
   }
+  const auto off_by = [&](std::size_t i, const Alignment& to_truth) {
+    const auto at = std::lower_bound(truth.times_ns.begin(), truth.times_ns.end(), run.estimate.times_ns[i]);
+    if (at == truth.times_ns.end()) return 0.0;
+    const Pose3& true_pose = truth.poses[static_cast<std::size_t>(at - truth.times_ns.begin())];
+    return (to_truth * run.estimate.poses[i].translation - true_pose.translation).norm();
+  };
   double guess = 0;
   double says = 0;
   for (std::size_t i = 0; i < run.status.size(); ++i) {
     if ((run.status[i] & kLost) == 0) continue;
-    const auto at = std::lower_bound(truth.times_ns.begin(), truth.times_ns.end(), run.estimate.times_ns[i]);
-    if (at == truth.times_ns.end()) continue;
-    const Pose3& true_pose = truth.poses[static_cast<std::size_t>(at - truth.times_ns.begin())];
-    const double off = (error.alignment * run.estimate.poses[i].translation - true_pose.translation).norm();
+    const double off = off_by(i, error.alignment);
     if (off < guess) continue;
     guess = off;
     says = error.alignment.scale * run.sigma_m[i];
+  }
+  const auto first_lost = std::find_if(run.status.begin(), run.status.end(), [](auto s) { return (s & kLost) != 0; });
+  Trajectory before;
+  const auto kept = static_cast<std::size_t>(first_lost - run.status.begin());
+  before.times_ns.assign(run.estimate.times_ns.begin(),
+                         run.estimate.times_ns.begin() + (first_lost - run.status.begin()));
+  before.poses.assign(run.estimate.poses.begin(), run.estimate.poses.begin() + (first_lost - run.status.begin()));
+  double worst = 0;
+  if (first_lost != run.status.end() && kept >= 10) {
+    const Association old = associate(before, truth, options);
+    const AbsoluteError trusted = absolute_error(old.estimate, old.reference, mode);
+    for (std::size_t i = kept; i < run.status.size(); ++i) {
+      if ((run.status[i] & (kLost | kMapLinkUnknown)) == 0) continue;
+      worst = std::max(worst, off_by(i, trusted.alignment) / (trusted.alignment.scale * run.sigma_m[i]));
+    }
   }
   const auto with = [&](std::uint32_t bit) {
     return static_cast<long>(
@@ -249,11 +269,13 @@ void report(const char* who, const Run& run, std::size_t pictures, const Traject
   };
   const auto count = [&](const char* name) { return static_cast<long>(count_of(run.counts, name)); };
   std::printf(
-      "%3zu/%zu  ATE %7.4f m  largest %7.4f  end %7.4f   lost %2ld (%6.3f m, says %6.3f)  found %ld   few %2ld  "
+      "%3zu/%zu  ATE %7.4f m  largest %7.4f  end %7.4f   lost %2ld (%6.3f m, says %6.3f, "
+      "at most %4.1f)  found %ld  elsewhere %2ld   few %2ld  "
       "recovered %2ld  anew %2ld   moving %3ld  again %4ld   %4.1f, %5.1f ms\n",
       run.estimate.times_ns.size(), pictures, error.translation.rmse, error.translation.max, last, with(kLost), guess,
-      says, with(kRefound), with(kFewFeatures), with(kRecovered), with(kReinitialised), count("tracks.moving"),
-      count("tracks.refound"), 1e3 * run.spent_s / static_cast<double>(pictures), 1e3 * run.longest_s);
+      says, worst, with(kRefound), with(kMapLinkUnknown), with(kFewFeatures), with(kRecovered), with(kReinitialised),
+      count("tracks.moving"), count("tracks.refound"), 1e3 * run.spent_s / static_cast<double>(pictures),
+      1e3 * run.longest_s);
   std::fflush(stdout);
 }
 

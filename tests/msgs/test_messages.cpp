@@ -311,6 +311,10 @@ TEST(Messages, BitsAreThoseOfTheLibrary) {
   EXPECT_EQ(estimate_t::STATUS_RECOVERED, static_cast<int>(kRecovered));
   EXPECT_EQ(estimate_t::STATUS_TOO_LATE, static_cast<int>(kTooLate));
   EXPECT_EQ(estimate_t::STATUS_BAD_COVARIANCE, static_cast<int>(kBadCovariance));
+  EXPECT_EQ(estimate_t::STATUS_LOST, static_cast<int>(kLost));
+  EXPECT_EQ(estimate_t::STATUS_STAMPS_DOUBTFUL, static_cast<int>(kStampsDoubtful));
+  EXPECT_EQ(estimate_t::STATUS_MAP_LINK_UNKNOWN, static_cast<int>(kMapLinkUnknown));
+  EXPECT_EQ(estimate_t::STATUS_GPS_STAMPS_DOUBTFUL, static_cast<int>(kGpsStampsDoubtful));
   EXPECT_EQ(image_t::PIXEL_FORMAT_GRAY, static_cast<int>(PixelFormat::kGray));
   EXPECT_EQ(image_t::PIXEL_FORMAT_BGR, static_cast<int>(PixelFormat::kBgr));
   EXPECT_EQ(image_t::PIXEL_FORMAT_RGB, static_cast<int>(PixelFormat::kRgb));

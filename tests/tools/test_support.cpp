@@ -19,6 +19,7 @@
 #include "tools/support/pacer.hpp"
 #include "tools/support/pipeline.hpp"
 #include "tools/support/program.hpp"
+#include "tools/support/slam_options.hpp"
 #include "tools/support/unit_check.hpp"
 
 namespace loc {
@@ -401,6 +402,44 @@ TEST(AnyEstimator, NamesLeadToEstimators) {
   EXPECT_FALSE(make_estimator(six_axes).takes_late(StreamKind::kImu));
   six_axes.fusion.use_gps = false;
   EXPECT_FALSE(make_estimator(six_axes).takes(StreamKind::kGps));
+}
+
+TEST(SlamSettings, OfPicturesHaveTheRulesForPictures) {
+  Rig rig;
+  CameraCalibration camera;
+  camera.width_px = 400;
+  camera.height_px = 300;
+  camera.intrinsics_px = {300, 300, 200, 150};
+  rig.cameras = {camera, camera};
+  rig.cameras[1].width_px = 600;
+  SlamArguments arguments;
+  EXPECT_EQ(slam_options(arguments, "mono-slam", rig).map.cover_radius, 0);
+  arguments.images = true;
+  // What hides the map is not built in, whatever the size of the picture.
+  const SlamOptions mono = slam_options(arguments, "mono-slam", rig);
+  EXPECT_GT(mono.map.cover_radius, 0.05);
+  EXPECT_LT(mono.map.cover_radius, 0.2);
+  EXPECT_GT(mono.map.steer_after_frames, 0);
+  EXPECT_GT(mono.relocate_s, 0);
+  EXPECT_TRUE(mono.second_order_noise);
+  EXPECT_EQ(mono.camera.width_px, 400);
+  arguments.camera = 1;
+  const SlamOptions second = slam_options(arguments, "mono-slam", rig);
+  EXPECT_EQ(second.map.cover_radius, mono.map.cover_radius);
+  EXPECT_EQ(second.camera_index, 1);
+  EXPECT_EQ(second.camera.width_px, 600);
+  const SlamOptions inertial = slam_options(arguments, "inertial-slam", rig);
+  EXPECT_EQ(inertial.motion, SlamMotion::kInertial);
+  EXPECT_EQ(inertial.map.cover_radius, 0);
+  EXPECT_GT(inertial.relocate_s, 0);
+  EXPECT_FALSE(inertial.second_order_noise);
+  // The file has the last word.
+  test::TempFolder folder;
+  arguments.config = (folder.path() / "slam.yaml").string();
+  std::ofstream(arguments.config) << "format: libloc-slam-1\nmap:\n  cover_radius: 0.15\n";
+  EXPECT_EQ(slam_options(arguments, "mono-slam", rig).map.cover_radius, 0.15);
+  std::ofstream(arguments.config) << "format: libloc-slam-1\nmap:\n  cover_radius: 40\n";
+  EXPECT_THROW(slam_options(arguments, "mono-slam", rig), std::invalid_argument);
 }
 
 TEST(Channels, AreParsedStrictly) {

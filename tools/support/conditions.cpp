@@ -15,10 +15,6 @@ constexpr double kSetBack = 5;  // [s]
 
 }  // namespace
 
-double apart_s(TimeNs a, TimeNs b) {
-  return 1e-9 * (static_cast<double>(a) - static_cast<double>(b));
-}
-
 const std::array<Condition, Conditions::kConditions>& Conditions::known() {
   static constexpr std::array<Condition, kConditions> kAll = {{{kNoImages, "no images"},
                                                                {kNoImu, "no IMU"},
@@ -29,7 +25,9 @@ const std::array<Condition, Conditions::kConditions>& Conditions::known() {
                                                                {kGpsRejected, "GPS rejected"},
                                                                {kOdometryRejected, "odometry rejected"},
                                                                {kCalibrationDoubtful, "calibration doubtful"},
+                                                               {kMapLinkUnknown, "link to the map from before unknown"},
                                                                {kStampsDoubtful, "stamps of camera and IMU doubtful"},
+                                                               {kGpsStampsDoubtful, "stamps of GPS doubtful"},
                                                                {kTiltDoubtful, "tilt doubtful"},
                                                                {kMagnetometerDisturbed, "magnetometer disturbed"}}};
   return kAll;

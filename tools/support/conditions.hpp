@@ -11,9 +11,6 @@
 
 namespace loc {
 
-/// a - b [s], of any times; exact to a microsecond.
-double apart_s(TimeNs a, TimeNs b);
-
 struct Condition {
   std::uint32_t bit;  ///< EstimateStatus
   const char* name;
@@ -47,7 +44,7 @@ class Conditions {
     TimeNs seen_ns = kNoTime;   // last said
     std::int64_t times = 0;
   };
-  static constexpr std::size_t kConditions = 12;
+  static constexpr std::size_t kConditions = 14;
   static const std::array<Condition, kConditions>& known();
 
   std::array<Track, kConditions> tracks_{};

@@ -67,14 +67,11 @@ bool is_slam(const std::string& method) {
   return method == kMono || method == kInertial;
 }
 
-SlamMotion slam_motion(const std::string& method) {
-  return method == kInertial ? SlamMotion::kInertial : SlamMotion::kConstantVelocity;
-}
-
-SlamOptions slam_options(const SlamArguments& arguments, const std::string& method, const Rig& rig,
-                         SlamOptions options) {
-  const SlamMotion motion = slam_motion(method);
+SlamOptions slam_options(const SlamArguments& arguments, const std::string& method, const Rig& rig) {
+  const SlamMotion motion = method == kInertial ? SlamMotion::kInertial : SlamMotion::kConstantVelocity;
+  SlamOptions options;
   options.motion = motion;
+  if (arguments.images) options = slam_options_for_images(options);
   if (rig.imu && !rig.imu->noise_measured.empty()) options.imu_noise = rig.imu->noise;
   if (!arguments.config.empty()) {
     try {
@@ -86,7 +83,7 @@ SlamOptions slam_options(const SlamArguments& arguments, const std::string& meth
       throw UsageError(arguments.config + ": motion is another one than that of --method " + method);
     }
   }
-  if (arguments.camera_option->count() > 0) options.camera_index = arguments.camera;
+  if (arguments.camera) options.camera_index = *arguments.camera;
   if (options.camera_index < 0 || static_cast<std::size_t>(options.camera_index) >= rig.cameras.size()) {
     throw UsageError("--method " + method + " needs the calibration of camera " + std::to_string(options.camera_index) +
                      "; the rig has " + std::to_string(rig.cameras.size()) + " cameras (--config)");

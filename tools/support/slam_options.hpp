@@ -15,7 +15,7 @@ struct SlamArguments {
   std::string config;
   std::string map_in;
   std::string map_out;
-  int camera = 0;
+  std::optional<int> camera;  ///< in place of what the settings say
   bool images = false;
   CLI::Option* config_option = nullptr;
   CLI::Option* map_in_option = nullptr;
@@ -26,15 +26,13 @@ struct SlamArguments {
 
 void add_slam_options(CLI::App& app, SlamArguments& arguments);
 bool is_slam(const std::string& method);
-/// Of a method that is SLAM.
-SlamMotion slam_motion(const std::string& method);
 
+/// What is usual (for --images: slam_options_for_images), then the file of settings.
 /// @param method mono-slam or inertial-slam @param rig has the camera, and the noise of the IMU where it was measured,
-/// which the file of settings may overrule @param options what neither says, but for the motion
+/// which the file of settings may overrule
 /// @throws UsageError for a rig without that camera, a file that says another motion; std::invalid_argument as
 /// SlamOptions::check.
-SlamOptions slam_options(const SlamArguments& arguments, const std::string& method, const Rig& rig,
-                         SlamOptions options = {});
+SlamOptions slam_options(const SlamArguments& arguments, const std::string& method, const Rig& rig);
 
 /// What --map-in has; nullopt when it was not given. @throws UsageError when it cannot be read, or was made with
 /// another camera or motion.

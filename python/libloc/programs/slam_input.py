@@ -235,7 +235,6 @@ def slam_options(options: argparse.Namespace, given: SlamInput) -> SlamOptions:
         out.motion = METHODS[options.method]
     elif given.pictures is not None and options.slam_config is not None:
         out.motion = libloc.read_slam_options(options.slam_config).motion
-    out.camera = given.rig.cameras[options.camera]  # what is usual for pictures depends on their size
     if given.pictures is not None:
         out = libloc.slam_options_for_images(out)
     if options.slam_config is not None:
