@@ -15,8 +15,9 @@ constexpr std::size_t kMostFixes = 400;  // in a window: more are thinned out
 constexpr double kLongestWindow = 6;     // of window_s: what took longer tells nothing
 constexpr double kHuber = 2.5;           // deviations
 constexpr int kPasses = 4;
+constexpr double kRegular = 1e-12;
 constexpr double kLeastNoise = 0.02;  // of a fix: errors that are no noise [m]
-constexpr std::size_t kFewestWindows = 2;
+constexpr std::size_t kFewestWindows = 3;
 constexpr double kUseful = 5;  // a window with a larger deviation does not count [s]
 constexpr double kMostCorrelation = 0.9;
 constexpr TimeNs kKept = 3'000'000'000;  // of a reckoning
@@ -117,8 +118,8 @@ std::optional<GpsLagWatch::Result> GpsLagWatch::solve() const {
       normal += weight * rows.transpose() * rows;
       right += weight * rows.transpose() * difference(window_[i]);
     }
-    // Directions that were not excited stay at zero.
-    normal.diagonal().array() += 1e-9 * normal.diagonal().maxCoeff();
+    // Directions that were not excited at all stay at zero.
+    normal.diagonal() += kRegular * normal.diagonal();
     solver.compute(normal);
     x = solver.solve(right);
     if (!x.allFinite()) return std::nullopt;

@@ -22,7 +22,7 @@
 namespace loc {
 
 struct GpsLagWatchOptions {
-  double window_s = 20;     ///< the shortest window; one with fewer than 12 fixes goes on
+  double window_s = 30;     ///< the shortest window; one with fewer than 12 fixes goes on
   int drift_order = 1;      ///< of the other way, see above; 0 to 2
   bool scale_known = true;  ///< of the other way
   double least_s = 0.25;    ///< of a doubt: d is that large, and …
@@ -47,7 +47,7 @@ class GpsLagWatch {
   void reset();
 
   bool doubtful() const { return doubtful_; }
-  /// What has to be added to the stamps of GPS, and its deviation; NaN before there are two windows. [s]
+  /// What has to be added to the stamps of GPS, and its deviation; NaN before there are three windows. [s]
   double offset_s() const { return offset_s_; }
   double sigma_s() const { return sigma_s_; }
 

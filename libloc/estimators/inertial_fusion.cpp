@@ -107,7 +107,7 @@ InertialFusion::InertialFusion(const InertialFusionOptions& options)
       bank_(options.heading_bank, options.filter),
       start_(options.start, options.stand_still, options.filter.noise, options.filter.gravity.norm()),
       rest_(options.stand_still, options.filter.noise, options.filter.gravity.norm()),
-      lag_({.window_s = 20, .drift_order = 2}) {
+      lag_({.drift_order = 2}) {
   if (options.origin) world_.emplace(*options.origin);
   if (options.given_start) {
     // What is wrong with it is told now, not at the first sample.

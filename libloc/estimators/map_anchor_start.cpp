@@ -47,12 +47,19 @@ double weight_of(const Eigen::Matrix3d& cov) {
 
 class Problem {
  public:
-  Problem(std::span<const AnchorPair> pairs, const AnchorPrior& prior, double way_now) : pairs_(pairs), prior_(prior) {
-    position_information_.reserve(pairs.size());
+  Problem(std::span<const AnchorPair> pairs, const AnchorPrior& prior) : pairs_(pairs), prior_(prior) { weigh(0, 0); }
+
+  // What the map drifts until now counts for the errors of the fixes; the way is in units of the map.
+  // @param scale metres a unit
+  void weigh(double way_now, double scale) {
+    position_information_.clear();
+    position_information_.reserve(pairs_.size());
+    centre_.setZero();
+    place_.setZero();
     double sum = 0;
-    for (const AnchorPair& pair : pairs) {
+    for (const AnchorPair& pair : pairs_) {
       Eigen::Matrix3d cov = pair.fix.position_cov;
-      cov.diagonal().array() += square(prior.position_walk) * std::max(0.0, way_now - pair.way);
+      cov.diagonal().array() += square(prior_.position_walk) * scale * std::max(0.0, way_now - pair.way);
       Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
       if (pair.fix.has_height) {
         information = cov.inverse();
@@ -153,10 +160,11 @@ class Problem {
 std::optional<AnchorStart> find_anchor(std::span<const AnchorPair> pairs, const AnchorPrior& prior,
                                        const Eigen::Vector3d& position, double way_now) {
   if (pairs.size() < kFewest) return std::nullopt;
-  const Problem problem(pairs, prior, way_now);
+  Problem problem(pairs, prior);
   AnchorStart found;
   AnchorState& state = found.state;
   if (!problem.start(state.q_world_map, state.scale)) return std::nullopt;
+  problem.weigh(way_now, state.scale);
   const Eigen::Quaterniond upright = state.q_world_map;
   Eigen::Vector3d t = problem.place();
   Matrix7 information;

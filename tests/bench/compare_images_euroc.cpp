@@ -2,6 +2,7 @@
 // its ground truth: camera alone, and with an IMU that is simulated from the ground truth, because its readings are not
 // at hand.
 //   compare_images_euroc [SEEDS]     so many draws of the IMU's noise (default 1)
+//   compare_images_euroc doubts      what ResidualWatch and StampWatch say of right and wrong intrinsics and stamps
 // Pictures: euroc-mh01-images in $LIBLOC_DATA, or in shared/data beside the project's folder; without them it says so
 // and ends with 0. Exit code 1: a figure is beyond its bar.
 // Simulated IMU: 200 Hz, splines with two continuous derivatives through means of ten poses (50 ms) of the ground
@@ -15,6 +16,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -128,6 +130,17 @@ struct Run {
   std::vector<double> whole_ms;  ///< with the IMU samples since the picture before
   NamedCounts counts;
   std::uint32_t status = 0;
+  ResidualWatchVerdict verdict;  ///< the last one
+  double first_doubt_s = kUnknown;
+  double offset_s = kUnknown;  ///< by StampWatch
+  double sigma_s = kUnknown;
+};
+
+// What is told to SLAM in place of what is right.
+struct Fault {
+  const char* name;
+  CameraCalibration camera;
+  double late_s = 0;  ///< stamps of the pictures
 };
 
 double ms_since(std::chrono::steady_clock::time_point begin) {
@@ -139,11 +152,14 @@ void keep(const SlamFrame& frame, Run& run) {
   run.eye.poses.push_back({frame.q_world_camera, frame.camera_position});
   run.filter_ms.push_back(1e3 * frame.time_spent_s);
   run.status |= frame.estimate.status;
+  if ((frame.estimate.status & kCalibrationDoubtful) != 0 && std::isnan(run.first_doubt_s)) {
+    run.first_doubt_s = to_seconds(frame.time_ns - run.eye.times_ns.front());
+  }
 }
 
-Run run_alone(const Recording& recording) {
+Run run_alone(const Recording& recording, const CameraCalibration& camera) {
   SlamOptions options;
-  options.camera = recording.camera;
+  options.camera = camera;
   // The camera is the body: what moves smoothly is its own path then, in the unit of the map.
   options.camera.T_body_camera = Pose3{};
   ImageSlam<MonoSlam> slam(slam_options_for_images(options));
@@ -156,10 +172,11 @@ Run run_alone(const Recording& recording) {
     keep(slam.slam().frame(), out);
   }
   out.counts = slam.counts();
+  out.verdict = slam.slam().filter().residual_watch().verdict();
   return out;
 }
 
-Run run_inertial(const Recording& recording, const TruthMotion& motion, std::uint64_t seed) {
+Run run_inertial(const Recording& recording, const TruthMotion& motion, std::uint64_t seed, const Fault& fault) {
   ImuModel model = ImuModel::perfect(200);
   model.gyroscope.noise_density = recording.imu.noise.gyroscope_noise_density;
   model.gyroscope.random_walk = recording.imu.noise.gyroscope_random_walk;
@@ -171,7 +188,7 @@ Run run_inertial(const Recording& recording, const TruthMotion& motion, std::uin
 
   SlamOptions options;
   options.motion = SlamMotion::kInertial;
-  options.camera = recording.camera;
+  options.camera = fault.camera;
   options.imu_noise = recording.imu.noise;
   options.imu_sampling = ImuSampling::kPoint;
   ImageSlam<InertialSlam> slam(slam_options_for_images(options));
@@ -187,9 +204,12 @@ Run run_inertial(const Recording& recording, const TruthMotion& motion, std::uin
   while (now - period >= motion.start_ns()) now -= period;
   const TimeNs end = motion.start_ns() + from_seconds(motion.duration_s());
   for (std::int64_t sequence = 0; now <= end; now += period, ++sequence) {
-    while (next < recording.images.size() && recording.images[next].time_ns <= now) {
+    const TimeNs late = from_seconds(fault.late_s);
+    while (next < recording.images.size() && recording.images[next].time_ns + late <= now) {
+      ImageMeasurement image = recording.images[next++];
+      image.time_ns += late;
       const auto begin = std::chrono::steady_clock::now();
-      slam.process(recording.images[next++]);
+      slam.process(image);
       out.whole_ms.push_back(spent + ms_since(begin));
       spent = 0;
       out.front_ms.push_back(1e3 * slam.tracker().times().total_s);
@@ -202,8 +222,12 @@ Run run_inertial(const Recording& recording, const TruthMotion& motion, std::uin
     slam.process(sample);
     spent += ms_since(begin);
     kept();
+    out.status |= slam.estimate().status & kStampsDoubtful;
   }
   out.counts = slam.counts();
+  out.verdict = slam.slam().filter().residual_watch().verdict();
+  out.offset_s = slam.slam().stamp_watch().offset_s();
+  out.sigma_s = slam.slam().stamp_watch().sigma_s();
   return out;
 }
 
@@ -255,7 +279,7 @@ void print_counts(const Run& run) {
 }
 
 bool report_alone(const Recording& recording) {
-  const Run run = run_alone(recording);
+  const Run run = run_alone(recording, recording.camera);
   const TimeNs begin = recording.images.front().time_ns;
   const TimeNs middle = recording.images[kMoving].time_ns;
   const TimeNs end = recording.images.back().time_ns + 1;
@@ -293,7 +317,7 @@ bool report_inertial(const Recording& recording, std::uint64_t seed) {
     squares += (motion.at(t).T_world_body.translation - recording.body.poses[i].translation).squaredNorm();
     ++count;
   }
-  const Run run = run_inertial(recording, motion, seed);
+  const Run run = run_inertial(recording, motion, seed, {"none", recording.camera});
   std::printf("with an IMU SIMULATED from the ground truth, seed %llu (splines %.2f mm rms from it; SE(3))\n",
               static_cast<unsigned long long>(seed), 1e3 * std::sqrt(squares / static_cast<double>(count)));
   std::printf("  %zu of %zu pictures with an estimate\n", run.eye.times_ns.size(), recording.images.size());
@@ -322,13 +346,52 @@ bool report_inertial(const Recording& recording, std::uint64_t seed) {
   return ok;
 }
 
-int run(int seeds) {
+void report_doubts(const Recording& recording) {
+  const auto with = [&](const char* name, double late_s, const std::function<void(CameraCalibration&)>& change) {
+    Fault out{name, recording.camera, late_s};
+    change(out.camera);
+    return out;
+  };
+  const auto nothing = [](CameraCalibration&) {};
+  const std::vector<Fault> faults = {with("none", 0, nothing),
+                                     with("f x 0.9", 0, [](CameraCalibration& c) { c.intrinsics_px.head<2>() *= 0.9; }),
+                                     with("f x 1.1", 0, [](CameraCalibration& c) { c.intrinsics_px.head<2>() *= 1.1; }),
+                                     with("cx + 20 px", 0, [](CameraCalibration& c) { c.intrinsics_px[2] += 20; }),
+                                     with("cy + 20 px", 0, [](CameraCalibration& c) { c.intrinsics_px[3] += 20; }),
+                                     with("k1 + 0.05", 0, [](CameraCalibration& c) { c.distortion[0] += 0.05; }),
+                                     with("pictures 20 ms late", 0.02, nothing),
+                                     with("pictures 50 ms early", -0.05, nothing),
+                                     with("pictures 300 ms late", 0.3, nothing)};
+  const TruthMotion motion(recording.body);
+  const auto line = [](const char* who, const Run& run) {
+    const auto says = [&](std::uint32_t bit) { return (run.status & bit) != 0 ? "doubtful" : "-"; };
+    std::printf(
+        "  %-9s intrinsics %-8s from %5.1f s; ln f %6.3f +- %.3f, cx %6.1f +- %.1f, cy %6.1f +- %.1f, k1 %6.3f +- "
+        "%.3f;  stamps %-8s add %.1f +- %.1f ms\n",
+        who, says(kCalibrationDoubtful), run.first_doubt_s, run.verdict.db[0], run.verdict.sigma[0], run.verdict.db[1],
+        run.verdict.sigma[1], run.verdict.db[2], run.verdict.sigma[2], run.verdict.db[3], run.verdict.sigma[3],
+        says(kStampsDoubtful), 1e3 * run.offset_s, 1e3 * run.sigma_s);
+    std::fflush(stdout);
+  };
+  for (const Fault& fault : faults) {
+    std::printf("%s\n", fault.name);
+    if (fault.late_s == 0) line("alone", run_alone(recording, fault.camera));
+    line("with IMU", run_inertial(recording, motion, 1, fault));
+  }
+}
+
+int run(const std::string& what) {
   const std::filesystem::path folder = test::data_folder() / "euroc-mh01-images";
   if (!std::filesystem::exists(folder)) {
     std::printf("skipped: %s is absent; LIBLOC_DATA names the folder of the recordings\n", folder.c_str());
     return 0;
   }
   const Recording recording = read(folder);
+  if (what == "doubts") {
+    report_doubts(recording);
+    return 0;
+  }
+  const int seeds = std::stoi(what);
   bool ok = report_alone(recording);
   for (int seed = 1; seed <= seeds; ++seed) ok = report_inertial(recording, static_cast<std::uint64_t>(seed)) && ok;
   return ok ? 0 : 1;
@@ -339,7 +402,7 @@ int run(int seeds) {
 
 int main(int argc, char** argv) {
   try {
-    return loc::run(argc > 1 ? std::atoi(argv[1]) : 1);
+    return loc::run(argc > 1 ? argv[1] : "1");
   } catch (const std::exception& error) {
     std::fprintf(stderr, "compare_images_euroc: %s\n", error.what());
     return 2;

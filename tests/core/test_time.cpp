@@ -28,6 +28,13 @@ TEST(Time, RefusesWhatIsNoTime) {
   EXPECT_THROW(from_seconds(1e10), std::invalid_argument);
 }
 
+TEST(Time, ApartIsOfAnyTwoTimes) {
+  EXPECT_NEAR(apart_s(1'700'000'001'500'000'000, 1'700'000'000'000'000'000), 1.5, 1e-6);
+  constexpr TimeNs kLast = std::numeric_limits<TimeNs>::max();
+  EXPECT_NEAR(apart_s(kLast, kNoTime), 1.8446744e10, 1e4);
+  EXPECT_NEAR(apart_s(kNoTime, kLast), -1.8446744e10, 1e4);
+}
+
 TEST(Time, FormatAndParseAreInverse) {
   Random random(1);
   for (int i = 0; i < 1000; ++i) {

@@ -1,10 +1,14 @@
-// StreamWatch and AttitudeCheck: what an estimator goes on without, and a second opinion on its vertical.
+// StreamWatch, AttitudeCheck and GpsLagWatch: what an estimator goes on without, a second opinion on its vertical, and
+// whether fixes are of the time that they say.
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 
+#include "libloc/core/random.hpp"
 #include "libloc/estimators/attitude_check.hpp"
+#include "libloc/estimators/gps_lag_watch.hpp"
 #include "libloc/estimators/stream_watch.hpp"
 #include "libloc/geometry/so3.hpp"
 
@@ -153,6 +157,117 @@ TEST(AttitudeCheck, TheMagnetometerTellsWhereTheWorldsXPoints) {
   const auto heading = with_field.check.heading_of_world(with_field.estimate(so3::exp({0, 0, -0.7}), 0.01));
   ASSERT_TRUE(heading.has_value());
   EXPECT_NEAR(*heading, 0.7, 0.05);
+}
+
+using Path = std::function<Eigen::Vector2d(double)>;
+
+Eigen::Vector2d winding(double t) {
+  return {60 * std::sin(0.1 * t), 8 * t - 30 * std::sin(0.15 * t)};
+}
+
+// Round blocks of 25 m, on foot.
+Eigen::Vector2d round_the_block(double t) {
+  const double gone = std::fmod(1.4 * t, 100);
+  const double side = std::fmod(gone, 25);
+  if (gone < 25) return {side, 0};
+  if (gone < 50) return {25, side};
+  if (gone < 75) return {25 - side, 25};
+  return {0, 25 - side};
+}
+
+// Fixes d late, half of their error the same for a minute; the other way drifts.
+GpsLagWatch watched(const Path& path, double d, std::uint64_t seed, const GpsLagWatchOptions& options = {},
+                    double jump_every_s = 1e9) {
+  GpsLagWatch watch(options);
+  Random random(seed);
+  const auto noise = [&](double sigma) { return Eigen::Vector2d(sigma * random.normal(), sigma * random.normal()); };
+  Eigen::Vector2d slow = noise(1.5);
+  Eigen::Vector2d drift = Eigen::Vector2d::Zero();
+  const double keep = std::exp(-1.0 / 60);
+  for (int t = 0; t < 480; ++t) {
+    slow = keep * slow + noise(1.5 * std::sqrt(1 - keep * keep));
+    drift += noise(0.03);
+    if (t > 0 && std::fmod(t, jump_every_s) < 0.5) {
+      drift += Eigen::Vector2d(40, -30);
+      watch.break_off();
+    }
+    constexpr double kH = 1e-3;
+    watch.see(from_seconds(t), path(t + d) + slow + noise(0.5), path(t) + drift,
+              (path(t + kH) - path(t - kH)) / (2 * kH));
+  }
+  return watch;
+}
+
+TEST(GpsLagWatch, TellsStampsThatAreASecondOffAndLeavesOthersInPeace) {
+  for (const bool on_foot : {false, true}) {
+    const Path path = on_foot ? Path(round_the_block) : Path(winding);
+    for (const int order : {1, 2}) {
+      for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+        const GpsLagWatchOptions options{.drift_order = order, .scale_known = order == 2};
+        const GpsLagWatch right = watched(path, 0, seed, options);
+        EXPECT_FALSE(right.doubtful()) << right.offset_s() << " +- " << right.sigma_s();
+        for (const double d : {1.0, -1.0}) {
+          const GpsLagWatch wrong = watched(path, d, seed, options);
+          EXPECT_TRUE(wrong.doubtful()) << d << ": " << wrong.offset_s() << " +- " << wrong.sigma_s();
+          EXPECT_NEAR(wrong.offset_s(), d, 0.4);
+        }
+      }
+    }
+  }
+}
+
+TEST(GpsLagWatch, SaysNothingOfStraightWaysAndSteadyCircles) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    EXPECT_FALSE(watched([](double t) { return Eigen::Vector2d(8 * t, 0); }, 1, seed).doubtful());
+    const Path circle = [](double t) { return Eigen::Vector2d(30 * std::sin(0.25 * t), 30 * std::cos(0.25 * t)); };
+    EXPECT_FALSE(watched(circle, 1, seed).doubtful());
+    EXPECT_FALSE(watched(winding, 0, seed, {}, 45).doubtful());
+  }
+}
+
+TEST(GpsLagWatch, OptionsAreChecked) {
+  EXPECT_THROW(GpsLagWatch({.window_s = 0}), std::invalid_argument);
+  EXPECT_THROW(GpsLagWatch({.drift_order = 3}), std::invalid_argument);
+  EXPECT_THROW(GpsLagWatch({.least_s = std::nan("")}), std::invalid_argument);
+}
+
+// A steady circle: the rate and the force of the body do not change.
+TEST(ImuReckoning, GoesWhereTheImuSays) {
+  constexpr double kRate = 0.4;
+  constexpr double kSpeed = 6;
+  const auto truth = [=](double t) {
+    ImuReckoning::Point x;
+    x.position = kSpeed / kRate * Eigen::Vector3d(std::sin(kRate * t), 1 - std::cos(kRate * t), 0);
+    x.velocity = kSpeed * Eigen::Vector3d(std::cos(kRate * t), std::sin(kRate * t), 0);
+    x.q_world_body = so3::exp({0, 0, kRate * t});
+    return x;
+  };
+  const Eigen::Vector3d gyroscope_bias(0.01, -0.02, 0.03);
+  const Eigen::Vector3d accelerometer_bias(0.1, 0.2, -0.3);
+  ImuReckoning reckoning;
+  EXPECT_FALSE(reckoning.at(0));
+  ImuReckoning::Point begin = truth(0);
+  begin.time_ns = 0;
+  reckoning.begin(begin, gyroscope_bias, accelerometer_bias);
+  ImuMeasurement imu;
+  imu.angular_velocity = Eigen::Vector3d(0, 0, kRate) + gyroscope_bias;
+  imu.specific_force = Eigen::Vector3d(0, kSpeed * kRate, 9.81) + accelerometer_bias;
+  for (int i = 1; i <= 1000; ++i) {
+    imu.time_ns = from_seconds(0.005 * i);
+    reckoning.step(imu, 9.81);
+  }
+  for (const double t : {2.5, 4.0, 4.9987, 5.02}) {
+    const auto point = reckoning.at(from_seconds(t));
+    ASSERT_TRUE(point) << t;
+    EXPECT_LT((point->position - truth(t).position).norm(), 0.01) << t;
+    EXPECT_LT((point->velocity - truth(t).velocity).norm(), t > 5 ? 0.1 : 0.01) << t;
+    EXPECT_LT(point->q_world_body.angularDistance(truth(t).q_world_body), 0.01) << t;
+  }
+  EXPECT_FALSE(reckoning.at(from_seconds(1)));    // not kept for so long
+  EXPECT_FALSE(reckoning.at(from_seconds(5.2)));  // nobody knows yet
+  imu.time_ns = from_seconds(7);
+  reckoning.step(imu, 9.81);
+  EXPECT_FALSE(reckoning.running());
 }
 
 }  // namespace

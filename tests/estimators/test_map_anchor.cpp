@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "libloc/core/random.hpp"
@@ -552,6 +553,186 @@ TEST(MapAnchor, FramesAndPointsComeToTheSamePlaceAsThePose) {
 }
 
 // The deviation of the heading is the anchor's, not that of the pose in its map beside it.
+// SLAM that has diverged says so by an estimate without a pose, and begins a new map with the next one.
+TEST(MapAnchor, AMapThatDivergesLeavesNothingBehind) {
+  for (const bool inertial : {true, false}) {
+    Ride ride;
+    ride.unit = inertial ? 1 : 0.4;
+    ride.drifts = false;
+    bool anew = false;
+    double worst = 0;
+    ride.spoil_pose = [&](double t, Estimate& pose) {
+      if (t < 30) return;
+      if (t < 30.5) {
+        pose.valid = 0;
+        pose.position.setConstant(1e300);
+        pose.covariance.setConstant(kUnknown);
+        return;
+      }
+      if (!std::exchange(anew, true)) pose.status |= kReinitialised;
+      pose.position = 3 * pose.position + Eigen::Vector3d(1000, 0, 5);
+      pose.velocity *= 3;
+    };
+    if (inertial) {
+      ride.spoil_pose = [&](double t, Estimate& pose) {
+        if (t >= 30 && t < 30.5) pose.valid = 0, pose.position.setConstant(1e300);
+        if (t < 30.5) return;
+        if (!std::exchange(anew, true)) pose.status |= kReinitialised;
+        pose.position += Eigen::Vector3d(1000, 0, 5);
+      };
+    }
+    ride.see = [&](double t, const Estimate& e, const Truth& x) {
+      if (t > 30 && t < 30.5) {
+        EXPECT_TRUE(std::isnan(e.origin.latitude)) << t;
+        EXPECT_EQ(e.valid, 0U);
+      }
+      if (std::isfinite(e.origin.latitude) && t > 20) worst = std::max(worst, position_error(e, x));
+      if (t > 59) {
+        EXPECT_TRUE(std::isfinite(e.origin.latitude));
+      }
+    };
+    const MapAnchor anchor = run(ride, white(inertial), 21);
+    EXPECT_LT(worst, inertial ? 3 : 5) << inertial;
+    EXPECT_EQ(count(anchor.counts(), "anchor.map_began_anew"), 1);
+    EXPECT_EQ(count(anchor.counts(), "anchor.started"), 2);
+  }
+}
+
+// Lost, and then in surroundings that are new to the map: the guess is not taken for a place in the map.
+TEST(MapAnchor, GoingOnElsewhereIsNotFindingBack) {
+  for (const bool inertial : {true, false}) {
+    Ride ride;
+    ride.drifts = false;
+    ride.gps_there = [](double t) { return t < 28 || t > 44; };
+    ride.spoil_pose = [&](double t, Estimate& pose) {
+      if (t < 30) return;
+      const double astray = 2 * std::min(t - 30, 4.0) * std::min(t - 30, 4.0);
+      pose.position.x() += astray;
+      pose.status |= t < 34 ? kLost : kMapLinkUnknown;
+      pose.covariance.block<3, 3>(3, 3) += (0.1 + astray * astray) * Eigen::Matrix3d::Identity();
+    };
+    double scale_sigma = 0;
+    double at_end = 0;
+    ride.see = [&](double t, const Estimate& e, const Truth& x) {
+      const double error = position_error(e, x);
+      if (t > 30 && t < 44) {
+        EXPECT_LT(error, 3 * std::sqrt(e.covariance.block<3, 3>(3, 3).trace()) + 1) << t;
+      }
+      if (t > 35 && t < 35.1) {
+        EXPECT_GT(error, 20);
+        scale_sigma = inertial ? 0 : e.scale_sigma / e.scale;
+      }
+      if (t > 59) at_end = std::max(at_end, error);
+    };
+    const MapAnchor anchor = run(ride, white(inertial), 22);
+    EXPECT_EQ(count(anchor.counts(), "anchor.went_on_elsewhere"), 1);
+    EXPECT_LT(at_end, 3) << inertial;
+    if (!inertial) {
+      EXPECT_GT(scale_sigma, 0.3);
+    }
+  }
+}
+
+// A magnetic heading that GPS contradicts for long is not believed again.
+TEST(MapAnchor, AHintThatGpsContradictsIsForgotten) {
+  const MapAnchorOptions options = white(true);
+  MapAnchor anchor(options);
+  Ride ride;
+  ride.drifts = false;
+  Drift drift(ride, options, 23);
+  Random random(23);
+  anchor.hint_heading(ride.heading + 1.5, 0.02);
+  double worst = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const double t = 0.02 * i;
+    const Truth x = truth_at(t);
+    const Estimate pose = drift.pose(t, x);
+    anchor.move(pose);
+    if (i % 50 == 0) {
+      GpsMeasurement gps = fix_at(t, ride, random);
+      gps.velocity_enu.setConstant(kUnknown);
+      anchor.fuse(gps);
+    }
+    if (t > 50) worst = std::max(worst, heading_error(anchor.in_world(pose), x));
+  }
+  EXPECT_GE(count(anchor.counts(), "anchor.started"), 1);
+  EXPECT_LT(worst, 0.1);
+}
+
+// Fixes whose stamps are a second off against the poses, with the receiver's errors that last.
+TEST(MapAnchor, StampsOfGpsThatAreOffAreTold) {
+  for (const bool inertial : {true, false}) {
+    for (const double late : {0.0, 1.0, -1.0}) {
+      Ride ride;
+      ride.duration_s = inertial ? 240 : 600;
+      ride.unit = inertial ? 1 : 2.5;
+      Random random(31);
+      ride.spoil_gps = [&](double t, GpsMeasurement& gps) {
+        gps = fix_at(t - late, ride, random);
+        gps.time_ns = from_seconds(t);
+      };
+      bool said = false;
+      ride.see = [&](double, const Estimate& e, const Truth&) { said |= (e.status & kGpsStampsDoubtful) != 0; };
+      MapAnchorOptions options = white(inertial);
+      options.gps_time_sigma = 0.1;
+      const MapAnchor anchor = run(ride, options, 31);
+      EXPECT_EQ(said, late != 0) << inertial << " " << late << ": " << anchor.lag_watch().offset_s() << " +- "
+                                 << anchor.lag_watch().sigma_s();
+      EXPECT_NEAR(anchor.lag_watch().offset_s(), -late, 0.3);
+      EXPECT_EQ(count(anchor.counts(), "stamps.gps_to_add_ms") != 0, late != 0);
+    }
+  }
+}
+
+std::vector<AnchorPair> pairs_on_the_road(double unit, double sigma, std::uint64_t seed) {
+  Random random(seed);
+  std::vector<AnchorPair> pairs;
+  for (int i = 0; i < 25; ++i) {
+    const Truth x = truth_at(i);
+    AnchorPair& pair = pairs.emplace_back();
+    pair.fix.time_ns = from_seconds(i);
+    pair.fix.position = x.position + sigma * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+    pair.fix.position_cov = sigma * sigma * Eigen::Matrix3d::Identity();
+    pair.fix.has_height = true;
+    pair.position = x.position / unit;
+    pair.velocity = x.velocity / unit;
+    pair.lever = pair.lever_velocity = Eigen::Vector3d::Zero();
+    pair.way = 8.0 * i / unit;
+  }
+  return pairs;
+}
+
+TEST(MapAnchorStart, AnOutlierCountsLittle) {
+  for (const bool scale_known : {true, false}) {
+    std::vector<AnchorPair> pairs = pairs_on_the_road(1, 1, 5);
+    pairs[12].fix.position += Eigen::Vector3d(150, -200, 0);
+    AnchorPrior prior;
+    prior.scale_known = scale_known;
+    prior.tilt_sigma = 0.01;
+    const auto found = find_anchor(pairs, prior, pairs.back().position, pairs.back().way);
+    ASSERT_TRUE(found);
+    EXPECT_LT((found->state.position - truth_at(24).position).norm(), 2) << scale_known;
+    EXPECT_NEAR(so3::heading(found->state.q_world_map), 0, 0.03);
+    EXPECT_NEAR(found->state.scale, 1, 0.03);
+  }
+}
+
+// The same drive in maps of other units: what the map drifts is in metres.
+TEST(MapAnchorStart, TheDriftOfTheMapIsInMetresWhateverItsUnit) {
+  const auto sigma = [](double unit, double walk) {
+    const std::vector<AnchorPair> pairs = pairs_on_the_road(unit, 0.1, 6);
+    AnchorPrior prior;
+    prior.scale_known = false;
+    prior.tilt_sigma = 0.01;
+    prior.position_walk = walk;
+    const auto found = find_anchor(pairs, prior, pairs.back().position, pairs.back().way);
+    return found ? std::sqrt(found->covariance.topLeftCorner<3, 3>().trace()) : 0;
+  };
+  const double in_metres = sigma(1, 0.1);
+  EXPECT_GT(in_metres, 1.5 * sigma(1, 0));
+  for (const double unit : {0.05, 40.0}) EXPECT_NEAR(sigma(unit, 0.1) / in_metres, 1, 0.02) << unit;
+}
+
 TEST(MapAnchor, TheHeadingsDeviationIsThatAgainstNorth) {
   const MapAnchor anchor = run(Ride(), white(true), 14);
   Estimate pose;

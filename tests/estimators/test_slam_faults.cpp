@@ -574,6 +574,12 @@ TEST(SlamFaults, WhatDoesNotFindItselfInItsMapSaysSoUntilItDoes) {
       const double end = elsewhere ? 3.75 : 4.5;  // relocate_s, then one more whose features are known
       const double since = t - 2.95;
       EXPECT_EQ((status & kLost) != 0, since > options.lost_after_s + 1e-9 && t < end - 1e-9) << t;
+      EXPECT_EQ((status & kMapLinkUnknown) != 0, elsewhere && t >= end - 1e-9) << t;
+      if ((status & kLost) != 0) {
+        // It may have stopped, or turned back.
+        const double sigma = std::sqrt(slam.estimate().covariance.block<3, 3>(3, 3).trace());
+        EXPECT_GT(sigma, 0.99 * std::sqrt(3) * options.sigma_velocity * since) << t;
+      }
       if (t < 2.96) map_before = slam.map().size();
       if (t > 2.96 && t < end - 0.04 - (elsewhere ? 0.05 : 0)) {
         EXPECT_EQ(slam.map().size(), map_before) << t;
@@ -587,6 +593,38 @@ TEST(SlamFaults, WhatDoesNotFindItselfInItsMapSaysSoUntilItDoes) {
     EXPECT_EQ(count_of(slam.counts(), "slam.gone_on"), elsewhere ? 1 : 0);
     EXPECT_GT(slam.frame().counts.measured, 20);
   }
+}
+
+// New surroundings for a while, then the old ones again: the link to them is told to be unknown until they are seen.
+TEST(SlamFaults, TheLinkToAMapThatWasLeftIsUnknownUntilItIsSeenAgain) {
+  SlamOptions options = ride_options(SlamMotion::kConstantVelocity);
+  options.relocate_s = 0.75;
+  MonoSlam slam(options);
+  SlamRide world({.rest_s = 0});
+  int refound = 0;
+  std::uint32_t status = 0;
+  double linked_s = 0;
+  world.run(7, [&](Measurement measurement) {
+    auto* frame = std::get_if<FeaturesMeasurement>(&measurement);
+    if (frame == nullptr) return;
+    const double t = seconds_of(measurement);
+    if (t >= 3 && t < 4.5) {
+      for (FeatureObservation& feature : frame->features) feature.id += 1000;
+    }
+    ASSERT_TRUE(slam.process(measurement));
+    status = slam.estimate().status;
+    if (t > 3.8 && t < 4.5) {
+      EXPECT_EQ(status & (kMapLinkUnknown | kLost), kMapLinkUnknown) << t;
+    }
+    if ((status & kRefound) != 0) {
+      ++refound;
+      linked_s = t;
+    }
+  });
+  EXPECT_EQ(refound, 1);
+  EXPECT_GE(linked_s, 4.5);
+  EXPECT_EQ(status & kMapLinkUnknown, 0U);
+  EXPECT_GE(count_of(slam.counts(), "slam.gone_on"), 1);
 }
 
 }  // namespace

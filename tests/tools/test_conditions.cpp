@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "tools/support/conditions.hpp"
@@ -40,6 +41,36 @@ TEST(Conditions, BeginAndEndAndAreCounted) {
   conditions.update(std::numeric_limits<TimeNs>::min() + 1, kNoImu);
   conditions.update(std::numeric_limits<TimeNs>::max(), 0);
   conditions.update(0, 0);
+}
+
+TEST(Conditions, SayByHowMuchAndWhatToDo) {
+  testing::internal::CaptureStderr();
+  Conditions conditions;
+  int asked = 0;
+  for (const double t : {1.0, 1.1, 1.2}) {
+    conditions.update(from_seconds(t), kStampsDoubtful | kLost | kCalibrationDoubtful, [&](std::uint32_t bit) {
+      ++asked;
+      return bit == kStampsDoubtful ? std::string("-22 ms") : std::string();
+    });
+  }
+  EXPECT_EQ(asked, 3);  // when each begins
+  ASSERT_EQ(conditions.held().size(), 3U);
+  int with_detail = 0;
+  for (const Conditions::Held& held : conditions.held()) {
+    if (held.condition.bit != kStampsDoubtful) {
+      EXPECT_EQ(held.detail, "");
+      continue;
+    }
+    ++with_detail;
+    EXPECT_EQ(held.detail, "-22 ms");
+  }
+  EXPECT_EQ(with_detail, 1);
+  const std::string log = testing::internal::GetCapturedStderr();
+  EXPECT_NE(log.find("condition=\"stamps of camera and IMU doubtful\" time=1.000000000 detail=\"-22 ms\" hint="),
+            std::string::npos)
+      << log;
+  EXPECT_NE(log.find("loc-calibrate camera"), std::string::npos) << log;
+  EXPECT_NE(log.find("condition=\"lost\" time=1.000000000\n"), std::string::npos) << log;
 }
 
 struct Written {

@@ -59,6 +59,10 @@ StreamWatchOptions watch_options(const AnyEstimator::Implementation& implementat
   return options;
 }
 
+std::string to_add(const std::string& what, double offset_s, double sigma_s) {
+  return to_text(1e3 * offset_s, 3) + " ms (deviation " + to_text(1e3 * sigma_s, 2) + ") to add to " + what;
+}
+
 constexpr std::array kMethods = {Method{"madgwick", make_madgwick}, Method{"error-state", make_error_state},
                                  Method{"mono-slam", make_mono_slam}, Method{"inertial-slam", make_inertial_slam}};
 
@@ -226,6 +230,24 @@ std::uint32_t AnyEstimator::status() const {
   // Of streams the newest measurement tells, of the rest the last estimate; an event happens once.
   const std::uint32_t events = gave_estimate_ ? 0U : kRefound;
   return (estimate_.status & ~(kOfStreams | events)) | watch_.status();
+}
+
+std::string AnyEstimator::detail_of(std::uint32_t bit) const {
+  const auto* inertial = std::get_if<InertialSlam>(&implementation_);
+  const auto* fusion = std::get_if<InertialFusion>(&implementation_);
+  if (bit == kStampsDoubtful && inertial != nullptr) {
+    return to_add("the camera's stamps", inertial->stamp_watch().offset_s(), inertial->stamp_watch().sigma_s());
+  }
+  if (bit == kGpsStampsDoubtful && (anchor_ || fusion != nullptr)) {
+    const GpsLagWatch& watch = anchor_ ? anchor_->lag_watch() : fusion->lag_watch();
+    return to_add("the fixes' stamps", watch.offset_s(), watch.sigma_s());
+  }
+  const SlamFilter* filter = slam();
+  if (bit != kCalibrationDoubtful || filter == nullptr) return {};
+  const ResidualWatchVerdict& verdict = filter->residual_watch().verdict();
+  const auto number = [&](int i) { return to_text(verdict.db[i], 3) + " +- " + to_text(verdict.sigma[i], 2); };
+  return "innovations turn with ln f " + number(0) + ", cx " + number(1) + " px, cy " + number(2) + " px, k1 " +
+         number(3);
 }
 
 NamedCounts AnyEstimator::counts() const {

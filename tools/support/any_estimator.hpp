@@ -74,6 +74,8 @@ class AnyEstimator {
 
   /// EstimateStatus that holds now, whether or not there are estimates.
   std::uint32_t status() const;
+  /// What is known of a doubt in it, in words: by how much, with its deviation. Empty for other bits.
+  std::string detail_of(std::uint32_t bit) const;
   TimeNs newest_measurement_ns() const { return watch_.newest_ns(); }
   /// Poses are on the Earth: of the last estimate.
   bool georeferenced() const { return georeferenced_; }

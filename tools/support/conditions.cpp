@@ -13,6 +13,20 @@ namespace {
 constexpr double kOver = 0.5;   // not said for so long [s]
 constexpr double kSetBack = 5;  // [s]
 
+// What a person can do about it.
+const char* hint_of(std::uint32_t bit) {
+  switch (bit) {
+    case kCalibrationDoubtful:
+      return "calibrate the camera's intrinsics anew: loc-calibrate camera";
+    case kStampsDoubtful:
+      return "mend the stamps of camera or IMU, or add it to time_offset_s of the camera in the rig";
+    case kGpsStampsDoubtful:
+      return "mend the stamps of GPS, or add it to time_offset_s of the GPS in the rig";
+    default:
+      return nullptr;
+  }
+}
+
 }  // namespace
 
 const std::array<Condition, Conditions::kConditions>& Conditions::known() {
@@ -33,7 +47,7 @@ const std::array<Condition, Conditions::kConditions>& Conditions::known() {
   return kAll;
 }
 
-void Conditions::update(TimeNs time_ns, std::uint32_t status) {
+void Conditions::update(TimeNs time_ns, std::uint32_t status, const Detail& detail) {
   if (time_ns == kNoTime) return;
   if (now_ns_ != kNoTime && apart_s(now_ns_, time_ns) > kSetBack) {
     for (Track& track : tracks_) track.since_ns = track.seen_ns = kNoTime;
@@ -53,7 +67,11 @@ void Conditions::update(TimeNs time_ns, std::uint32_t status) {
       track.since_ns = now_ns_;
       ++track.times;
       changed = true;
-      log_warning("event=degraded condition=\"{}\" time={}", condition.name, format_seconds(now_ns_));
+      track.detail = detail ? detail(condition.bit) : std::string();
+      const char* hint = hint_of(condition.bit);
+      log_warning("event=degraded condition=\"{}\" time={}{}{}", condition.name, format_seconds(now_ns_),
+                  track.detail.empty() ? "" : " detail=\"" + track.detail + "\"",
+                  hint == nullptr ? "" : " hint=\"" + std::string(hint) + "\"");
     } else if (track.since_ns != kNoTime && apart_s(now_ns_, track.seen_ns) > kOver) {
       log_info("event=restored condition=\"{}\" time={} after_s={:.3f}", condition.name, format_seconds(now_ns_),
                apart_s(track.seen_ns, track.since_ns));
@@ -65,7 +83,7 @@ void Conditions::update(TimeNs time_ns, std::uint32_t status) {
   changed_ = true;
   held_.clear();
   for (std::size_t i = 0; i < kConditions; ++i) {
-    if (tracks_[i].since_ns != kNoTime) held_.push_back({known()[i], tracks_[i].since_ns});
+    if (tracks_[i].since_ns != kNoTime) held_.push_back({known()[i], tracks_[i].since_ns, tracks_[i].detail});
   }
 }
 

@@ -4,6 +4,8 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
+#include <string>
 #include <vector>
 
 #include "libloc/core/named_count.hpp"
@@ -21,11 +23,14 @@ class Conditions {
   struct Held {
     Condition condition;
     TimeNs since_ns;
+    std::string detail;  ///< by how much, as it was when it began; may be empty
   };
+  /// By how much a condition holds, in words; asked once when it begins.
+  using Detail = std::function<std::string(std::uint32_t bit)>;
 
   /// What holds at this time, on the clock of the measurements. What is not said again for a while is over, so that a
   /// bit that comes and goes with every other sample is one condition.
-  void update(TimeNs time_ns, std::uint32_t status);
+  void update(TimeNs time_ns, std::uint32_t status, const Detail& detail = {});
   /// No measurement comes at all, which their clock cannot tell.
   void set_silent(bool silent);
 
@@ -42,6 +47,7 @@ class Conditions {
   struct Track {
     TimeNs since_ns = kNoTime;  // holds, since then
     TimeNs seen_ns = kNoTime;   // last said
+    std::string detail;
     std::int64_t times = 0;
   };
   static constexpr std::size_t kConditions = 14;

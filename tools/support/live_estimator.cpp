@@ -227,7 +227,7 @@ void LiveEstimator::publish_status() {
   message.status = static_cast<std::int32_t>(conditions.status());
   message.georeferenced = pipeline_.estimator().georeferenced() ? 1 : 0;
   for (const Conditions::Held& held : conditions.held()) {
-    message.condition.emplace_back(held.condition.name);
+    message.condition.push_back(held.condition.name + (held.detail.empty() ? std::string() : ": " + held.detail));
     message.since_s.push_back(apart_s(conditions.now_ns(), held.since_ns));
   }
   if (conditions.silent()) {

@@ -99,7 +99,8 @@ void EstimatorPipeline::drain() {
 
 void EstimatorPipeline::process(const Measurement& measurement) {
   pass_on(estimator_.process(measurement));
-  conditions_.update(estimator_.newest_measurement_ns(), estimator_.status());
+  conditions_.update(estimator_.newest_measurement_ns(), estimator_.status(),
+                     [this](std::uint32_t bit) { return estimator_.detail_of(bit); });
 }
 
 void EstimatorPipeline::pass_on(bool is_new) {
