@@ -96,7 +96,7 @@ def screenshot(recording: Path | str, picture: Path, size: tuple[int, int]) -> l
             state = client.get_state()
             if (in_file and not opened.store_ids) or state.active_recording is None or state.loading:
                 raise ViewerError(f"no screenshot: the viewer has not loaded {recording}")
-            client.set_time(TIMELINE, play_state="following")
+            _follow(client, end if not in_file else 0.0)
             shot, same, wanted = client.take_screenshot(), 0, 1 if in_file else 4
             while same < wanted:  # until the views have found their ranges
                 if time.monotonic() > end:
@@ -115,6 +115,18 @@ def screenshot(recording: Path | str, picture: Path, size: tuple[int, int]) -> l
     finally:
         part.unlink(missing_ok=True)
     return [f"{report.severity}: {report.summary}" for report in reports]
+
+
+def _follow(client: Any, end: float) -> None:
+    """Until then it is waited for the first data: a recording that has come may have no time yet."""
+    while True:
+        try:
+            client.set_time(TIMELINE, play_state="following")
+            return
+        except (RuntimeError, OSError, TimeoutError):
+            if time.monotonic() > end:
+                raise
+        time.sleep(0.1)
 
 
 def _last_lines(text: str, count: int = 5) -> str:
