@@ -8,12 +8,11 @@
 namespace loc {
 namespace {
 
-constexpr std::size_t kFewDepths = 5;      // fewer known depths say nothing about the others
-constexpr double kDepthTime = 1.5;         // over which the usual depth is averaged [s]
-constexpr double kMostDepthPart = 0.1;     // of one frame in it
-constexpr double kDepthTimeWithImu = 0.7;  // [s]
-constexpr double kKnownDepth = 0.3;        // relative deviation of a depth that counts as known
-constexpr double kBehindSigmas = 3;        // so far below zero an inverse depth is an error, not noise
+constexpr std::size_t kFewDepths = 5;   // fewer known depths say nothing about the others
+constexpr double kDepthTime = 1.5;      // over which the usual depth is averaged [s]
+constexpr double kMostDepthPart = 0.1;  // of one frame in it
+constexpr double kKnownDepth = 0.3;     // relative deviation of a depth that counts as known
+constexpr double kBehindSigmas = 3;     // so far below zero an inverse depth is an error, not noise
 
 }  // namespace
 
@@ -99,10 +98,10 @@ void SlamFilter::convert_landmarks() {
   covariance_.remove(ranges_);
 }
 
-// The median of what is known, averaged over time: what is known best is not what comes next (on a road it is far
-// away). A camera alone, whose unit of lengths hangs on it, takes what it sees, for longer than one with an IMU, which
-// makes metres of it and changes its mind by that. Where nothing of what is known is seen, as after the camera was
-// lost, what was usual until then counts: surroundings stay of one size.
+// The median of what is known. A camera alone averages that of what it sees over time: what is known best is not what
+// comes next (on a road it is far away), and its unit of lengths hangs on it; with an IMU, which makes metres of it,
+// the latest is the best. Where nothing of what is known is seen, as after the camera was lost, what was usual counts:
+// surroundings stay of one size.
 double SlamFilter::usual_inverse_depth() {
   depths_.clear();
   for (const SlamLandmark& landmark : landmarks_) {
@@ -123,11 +122,9 @@ double SlamFilter::usual_inverse_depth() {
   const double now = std::log(*middle);
   if (usual_depth_ns_ == kNoTime) usual_log_inverse_depth_ = now;
   const double since = usual_depth_ns_ == kNoTime ? 0 : std::abs(apart_s(time_ns_, usual_depth_ns_));
-  const double part =
-      layout_.inertial ? std::min(since / kDepthTimeWithImu, 1.0) : std::min(since / kDepthTime, kMostDepthPart);
-  usual_log_inverse_depth_ += part * (now - usual_log_inverse_depth_);
+  usual_log_inverse_depth_ += std::min(since / kDepthTime, kMostDepthPart) * (now - usual_log_inverse_depth_);
   usual_depth_ns_ = time_ns_;
-  return std::exp(usual_log_inverse_depth_);
+  return layout_.inertial ? *middle : std::exp(usual_log_inverse_depth_);
 }
 
 bool SlamFilter::add_landmark(const FeatureObservation& observation, double inverse_depth, double sigma) {

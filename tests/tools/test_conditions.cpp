@@ -44,7 +44,7 @@ TEST(Conditions, BeginAndEndAndAreCounted) {
 }
 
 TEST(Conditions, SayByHowMuchAndWhatToDo) {
-  testing::internal::CaptureStderr();
+  testing::internal::CaptureStdout();
   Conditions conditions;
   int asked = 0;
   for (const double t : {1.0, 1.1, 1.2}) {
@@ -65,7 +65,7 @@ TEST(Conditions, SayByHowMuchAndWhatToDo) {
     EXPECT_EQ(held.detail, "-22 ms");
   }
   EXPECT_EQ(with_detail, 1);
-  const std::string log = testing::internal::GetCapturedStderr();
+  const std::string log = testing::internal::GetCapturedStdout();
   EXPECT_NE(log.find("condition=\"stamps of camera and IMU doubtful\" time=1.000000000 detail=\"-22 ms\" hint="),
             std::string::npos)
       << log;
