@@ -714,6 +714,72 @@ TEST(InertialFusion, AReceiverThatBoastsIsSurvived) {
   EXPECT_GT(nees[1], 3 * nees[0]) << "the test would not notice";
 }
 
+// A winding road, from rest on; fixes at 1 Hz are where the body was late_s before their stamps. Level, x forward.
+struct WindingDrive {
+  double late_s = 0;
+  double gps_sigma = 1;
+  InertialFusionOptions options = white_fixes();
+  LocalFrame world{0.85, 0.2, 300};
+  std::uint32_t statuses = 0;
+  std::optional<InertialFusion> fusion;
+
+  static Eigen::Vector3d place(double t) {
+    // Speeds up for four seconds.
+    const double u = t < 3 ? 0 : t < 7 ? (t - 3) * (t - 3) / 8 : t - 5;
+    return {40 * std::sin(0.15 * u), 7 * u - 20 * std::sin(0.22 * u), 0};
+  }
+
+  void run(double duration_s, std::uint64_t seed) {
+    constexpr double kH = 1e-3;
+    Random random(seed);
+    fusion.emplace(options);
+    double heading = std::atan2(7 - 0.22 * 20, 0.15 * 40);
+    const double start = heading;
+    const auto heading_at = [&](double t) {
+      const Eigen::Vector3d v = (place(t + kH) - place(t - kH)) / (2 * kH);
+      return v.norm() < 1e-3 ? start : std::atan2(v.y(), v.x());
+    };
+    for (int i = 0; i <= duration_s * kRate; ++i) {
+      const double t = i / kRate;
+      if (i % 100 == 0) {
+        const GeodeticPoint at = world.to_geodetic(place(t - late_s) + gps_sigma * random.normal3());
+        GpsMeasurement fix;
+        fix.time_ns = from_seconds(t);
+        fix.fix = GpsFixType::k3d;
+        fix.latitude = at.latitude;
+        fix.longitude = at.longitude;
+        fix.altitude = at.altitude;
+        fix.position_cov = gps_sigma * gps_sigma * Eigen::Matrix3d::Identity();
+        fusion->process(fix);
+      }
+      const Eigen::Vector3d acceleration = (place(t + kH) - 2 * place(t) + place(t - kH)) / (kH * kH);
+      const double before = heading;
+      heading = heading_at(t);
+      ImuMeasurement imu;
+      imu.time_ns = from_seconds(t);
+      imu.angular_velocity = Eigen::Vector3d(0, 0, std::remainder(heading - before, 2 * std::numbers::pi) * kRate) +
+                             Eigen::Vector3d(0.004, -0.003, 0.005) + 1e-3 * random.normal3();
+      imu.specific_force =
+          Eigen::AngleAxisd(-heading, Eigen::Vector3d::UnitZ()) * (acceleration + Eigen::Vector3d(0, 0, 9.80665)) +
+          Eigen::Vector3d(0.05, -0.04, 0.03) + 0.03 * random.normal3();
+      if (fusion->process(imu)) statuses |= fusion->estimate().status;
+    }
+  }
+};
+
+TEST(InertialFusion, StampsOfGpsThatAreOffAreTold) {
+  for (const double late : {0.0, 1.0, -1.0}) {
+    WindingDrive d;
+    d.late_s = late;
+    d.run(400, 3);
+    const GpsLagWatch& watch = d.fusion->lag_watch();
+    EXPECT_EQ((d.statuses & kGpsStampsDoubtful) != 0, late != 0)
+        << late << ": " << watch.offset_s() << " +- " << watch.sigma_s();
+    EXPECT_NEAR(watch.offset_s(), -late, 0.4);
+    EXPECT_EQ(count(d.fusion->counts(), "stamps.gps_to_add_ms") != 0, late != 0);
+  }
+}
+
 TEST(InertialFusion, PresetsAndOptions) {
   for (const char* name : {"robust", "as_published", "16", "19"}) {
     Drive d;
