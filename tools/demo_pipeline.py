@@ -160,23 +160,21 @@ def main() -> int:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--estimator", default="", help="options of loc-estimator, in one string")
     parser.add_argument("--config", type=Path, help="calibration (rig.yaml), for driver and estimator")
-    parser.add_argument("--speed", default="max", help="of loc-driver")
     parser.add_argument("--driver", default="", help="more options of loc-driver, in one string")
     parser.add_argument("--pictures", action="store_true", help="pictures are among the measurements")
     parser.add_argument("source", nargs=2, metavar=("KIND", "PATH"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
     live, replay = arguments.out / "live.log", arguments.out / "replay.log"
-    more = ["--speed", arguments.speed]
+    more = ["--speed", "max"]
     if arguments.config is not None:
         more += ["--config", str(arguments.config)]
-    window = ["--driver-args", "--window 16"] if arguments.pictures and arguments.speed == "max" else []
-    driver = ["--driver-args", arguments.driver] if arguments.driver else window
+    driver = ["--driver-args", arguments.driver] if arguments.driver else []
     try:
         run_live(arguments.programs, arguments.source, arguments.estimator, live, more + driver)
         if arguments.pictures:
             again = ["lcm-log", str(live)]
-            run_live(arguments.programs, again, arguments.estimator, replay, more + window, "replay")
+            run_live(arguments.programs, again, arguments.estimator, replay, more, "replay")
         else:
             run_replay(arguments.programs, live, arguments.estimator, replay)
     except (PipelineError, OSError) as error:

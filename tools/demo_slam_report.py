@@ -4,8 +4,7 @@ and one picture that sums up the run.
     demo_slam_report.py --live live.log --replay replay.log --picture summary.png --title TEXT
 
 The logs hold the LCM types of msgs/ (Python package `loc`). The truth is LOC_REFERENCE in the log, or a TUM
-file (poses of the body). Exit code 1 when the runs differ or pictures were lost
-(with --paced: those that the driver sent and nobody logged).
+file (poses of the body). Exit code 1 when the runs differ or pictures were lost.
 """
 
 import io
@@ -147,21 +146,15 @@ def add_known_points(run: Run, message) -> None:
         run.map_points[message.point_id[index]] = points[index]
 
 
-def check_replay(live: Run, replay: Run, paced: bool = False) -> str:
-    """Same estimates, bit for bit, and no picture lost. Returns a sentence for the user.
-
-    paced: sent at the camera's own pace, where an estimator that falls behind drops pictures. They are
-    counted, and runs that have not taken the same pictures are not compared.
-    """
+def check_replay(live: Run, replay: Run) -> str:
+    """Same estimates, bit for bit, and no picture lost. Returns a sentence for the user."""
     check_logged("pictures", live.published, len(live.pictures))
-    late = []
     for name, run in (("live", live), ("the replay", replay)):
         if len(run.frames) != len(live.pictures):
-            late.append(f"{name}: {len(run.frames)} of {len(live.pictures)} pictures reached the filter")
-    if late and not paced:
-        raise ReportError("; ".join(late) + ": is the machine busy?")
-    if late:
-        return "; ".join(late) + ": too busy for the camera's pace, so the two runs are not compared"
+            raise ReportError(
+                f"{name}: {len(run.frames)} of {len(live.pictures)} pictures reached the filter:"
+                " is the machine busy?"
+            )
     return check_same(live.same, replay.same, f"{len(live.pictures)} pictures")
 
 
@@ -438,7 +431,7 @@ def draw(path: Path, title: str, run: Run, comparison: Comparison, rows) -> None
 
 def report(arguments) -> None:
     live, replay = read(arguments.live), read(arguments.replay)
-    print(check_replay(live, replay, arguments.paced))
+    print(check_replay(live, replay))
     metric = live.method == "inertial-slam"
     truth = live.truth if arguments.truth is None else read_tum(arguments.truth)
     arm = np.zeros(3) if arguments.camera is None else camera_in_body(arguments.camera)
@@ -454,9 +447,6 @@ def main() -> int:
     parser.add_argument("--truth", type=Path, help="TUM file with poses of the body, where the log has none")
     parser.add_argument(
         "--camera", type=Path, help="sensor.yaml of the camera (EuRoC): where it is in the body"
-    )
-    parser.add_argument(
-        "--paced", action="store_true", help="sent at the camera's own pace: pictures may have been dropped"
     )
     return demo_runs.run(report, parser)
 

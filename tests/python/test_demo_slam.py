@@ -110,17 +110,6 @@ def test_what_differs_or_is_lost_is_refused(tmp_path):
         report.check_replay(live, write_log(tmp_path / "late.log", pictures=50))
 
 
-def test_at_the_cameras_pace_dropped_pictures_are_counted(tmp_path):
-    live = write_log(tmp_path / "live.log")
-    late = write_log(tmp_path / "late.log", pictures=50)
-    assert "the replay: 50 of 60 pictures reached the filter" in report.check_replay(live, late, paced=True)
-    # None dropped: the runs must still be the same, and what was sent must be in the log.
-    with pytest.raises(report.ReportError, match="estimate 30 of the replay differs"):
-        report.check_replay(live, write_log(tmp_path / "other.log", offset=1e-12), paced=True)
-    with pytest.raises(report.ReportError, match="60 pictures, 59 were logged"):
-        report.check_replay(write_log(tmp_path / "lost.log", pictures=59), live, paced=True)
-
-
 def test_without_a_truth_the_way_is_shown_as_it_is(tmp_path):
     run = write_log(tmp_path / "live.log", truth=False)
     comparison = report.compare(run, run.truth, np.zeros(3), True)
