@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 
+#include "libloc/calib/dense.hpp"
 #include "libloc/core/check.hpp"
 #include "libloc/core/statistics.hpp"
 
@@ -114,8 +115,8 @@ TermFit fit_choices(const Eigen::MatrixXd& a, const Eigen::VectorXd& b) {
     for (Eigen::Index k = 0; k < n; ++k) part.col(k) = a.col(columns[static_cast<std::size_t>(k)]);
     const Eigen::VectorXd scale = part.colwise().norm().cwiseInverse();
     const Eigen::MatrixXd scaled = part * scale.asDiagonal();
-    const Eigen::LDLT<Eigen::MatrixXd> normal(scaled.transpose() * scaled);
-    const Eigen::VectorXd x = normal.solve(scaled.transpose() * b);
+    const Eigen::MatrixXd normal = dense::gram(scaled);
+    const Eigen::VectorXd x = dense::solve_symmetric(normal, scaled.transpose() * b);
     if (!x.allFinite() || !(x.array() > 0).all()) continue;
     const double cost = (scaled * x - b).squaredNorm();
     // A term more must pay (Akaike's criterion), or the ramp takes a part of every random walk.
@@ -124,7 +125,8 @@ TermFit fit_choices(const Eigen::MatrixXd& a, const Eigen::VectorXd& b) {
     least = judged;
     best = TermFit{};
     best.cost = cost;
-    const Eigen::MatrixXd cov = scale.asDiagonal() * normal.solve(Eigen::MatrixXd::Identity(n, n)) * scale.asDiagonal();
+    const Eigen::MatrixXd cov =
+        scale.asDiagonal() * dense::solve_symmetric(normal, Eigen::MatrixXd::Identity(n, n)) * scale.asDiagonal();
     for (Eigen::Index i = 0; i < n; ++i) {
       best.squares[columns[static_cast<std::size_t>(i)]] = x[i] * scale[i];
       for (Eigen::Index j = 0; j < n; ++j) {

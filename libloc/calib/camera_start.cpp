@@ -69,9 +69,7 @@ std::optional<Pose3> pose_of_plane(const Camera& camera, const BundleView& view)
   const double scale = std::sqrt(2 * static_cast<double>(pairs.size()) / trace);
 
   // ray x (H X) = 0 for all corners: H is the eigenvector to the smallest eigenvalue, found by inverse iteration.
-  using Matrix9d = Eigen::Matrix<double, 9, 9>;
-  using Vector9d = Eigen::Matrix<double, 9, 1>;
-  Matrix9d normal = Matrix9d::Zero();
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(9, 9);
   for (const auto& [point, ray] : pairs) {
     const Eigen::Vector3d X((point.x() - mean.x()) * scale, (point.y() - mean.y()) * scale, 1);
     const Eigen::Matrix3d P = Eigen::Matrix3d::Identity() - ray * ray.transpose();
@@ -80,10 +78,13 @@ std::optional<Pose3> pose_of_plane(const Camera& camera, const BundleView& view)
     }
   }
   normal.diagonal().array() += 1e-12 * normal.trace();
-  const Eigen::LDLT<Matrix9d> factor(normal);
-  Vector9d h;
+  const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
+  Eigen::VectorXd h(9);
   h << 1, 0.1, 0, 0, 1, 0.1, 0.1, 0, 1;
-  for (int i = 0; i < 12; ++i) h = factor.solve(h).normalized();
+  for (int i = 0; i < 12; ++i) {
+    h = factor.solve(h).eval();
+    h.normalize();
+  }
   if (!h.allFinite()) return std::nullopt;
   Eigen::Matrix3d H = Eigen::Map<const Eigen::Matrix3d>(h.data());
   double forward = 0;

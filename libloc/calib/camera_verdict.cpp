@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "libloc/calib/dense.hpp"
 #include "libloc/core/check.hpp"
 #include "libloc/core/statistics.hpp"
 #include "libloc/geometry/camera.hpp"
@@ -95,7 +96,7 @@ void find_uncertainty(CameraFit& fit) {
   std::vector<double> sigmas;
   for (const Cell& cell : cells) {
     const Eigen::Matrix<double, 2, 8> J = cell.J - cell.K * turn;
-    const double sigma = std::sqrt((J * cov * J.transpose()).trace());
+    const double sigma = std::sqrt(dense::propagate(J, cov).trace());
     out.sigma_px[cell.index] = sigma;
     sigmas.push_back(sigma);
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "libloc/calib/dense.hpp"
 #include "libloc/calib/ellipsoid_detail.hpp"
 #include "libloc/calib/least_squares.hpp"
 #include "libloc/core/random.hpp"
@@ -89,7 +90,7 @@ class Problem {
       Vector6 residual;
       Eigen::Matrix<double, 6, 6> prior;
       shape_prior(e, options_.shape_prior_sigma, residual, prior);
-      hessian.bottomRightCorner<6, 6>() += prior.transpose() * prior;
+      hessian.bottomRightCorner<6, 6>() += dense::gram(prior);
       gradient.tail<6>() += prior.transpose() * residual;
     }
   }
@@ -193,14 +194,14 @@ RobustFit refine(const NormalisedReadings& readings, const Ellipsoid& start, con
   while (fit.iterations < options.max_iterations) {
     ++fit.iterations;
     problem.linearise(fit.ellipsoid, fit.sigma, hessian, gradient);
-    const Eigen::MatrixXd h = basis.transpose() * hessian * basis;
+    const Eigen::MatrixXd h = dense::propagate(basis.transpose(), hessian);
     const Eigen::VectorXd g = basis.transpose() * gradient;
     Eigen::VectorXd step;
     bool accepted = false;
     for (int attempt = 0; attempt < 12 && !accepted; ++attempt) {
       Eigen::MatrixXd damped = h;
       damped.diagonal() += damping * h.diagonal() + Eigen::VectorXd::Constant(h.rows(), 1e-12 * h.trace());
-      step = damped.ldlt().solve(-g);
+      step = dense::solve_symmetric(damped, -g);
       const Ellipsoid candidate = moved(fit.ellipsoid, basis * step);
       if (step.allFinite() && positive_definite(candidate.matrix)) {
         const double candidate_cost = problem.cost(candidate, fit.sigma);
