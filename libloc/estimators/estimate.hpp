@@ -53,7 +53,7 @@ enum EstimateStatus : std::uint32_t {
   kRefound = 1U << 24U,  ///< It found itself again, since the last estimate.
   kCalibrationDoubtful = 1U << 25U,  ///< Pictures disagree with the map in a way that wrong intrinsics explain.
   kTiltDoubtful = 1U << 26U,         ///< The accelerometers by themselves say another vertical.
-  kStampsDoubtful = 1U << 27U,       ///< Camera and gyroscope turn alike, but not at the same time.
+  kStampsDoubtful = 1U << 27U,       ///< Camera (odometry) and gyroscope turn alike, but not at the same time.
   /// It was lost and goes on in surroundings that are new: where they are in the map from before, and for a camera
   /// alone how long its unit of lengths is now, is a guess, as the covariance says. Until something of that map is seen
   /// again.

@@ -349,6 +349,7 @@ bool InertialFusion::step(const ImuMeasurement& imu) {
   }
   if (outcome == PredictOutcome::kBridged) status_ |= kBridged | kGap;
   reckoning_.step(imu, options_.filter.gravity.norm());
+  if (odometry_used_) stamps_.see(imu);
   ++imu_used_;
   const std::vector<FusionResult> results = bank_.results();
   for (const FusionResult& result : results) take_note(result);
@@ -396,6 +397,7 @@ Estimate InertialFusion::estimate() const {
   out.sequence = last_.sequence;
   out.status = status_;
   if (lag_.doubtful()) out.status |= kGpsStampsDoubtful;
+  if (stamps_.doubtful()) out.status |= kStampsDoubtful;
   if (!running_) {
     out.status |= kInitialising;
     return out;
@@ -436,6 +438,7 @@ NamedCounts InertialFusion::counts() const {
   NamedCounts out = {{"imu.used", imu_used_}};
   for (const auto& [name, value] : all) out.push_back({name, value});
   out.push_back({"rest.false_alarms", rest_.false_alarms()});
+  if (stamps_.doubtful()) out.push_back({"stamps.odometry_to_add_ms", std::llround(1e3 * stamps_.offset_s())});
   if (lag_.doubtful()) out.push_back({"stamps.gps_to_add_ms", std::llround(1e3 * lag_.offset_s())});
   return out;
 }

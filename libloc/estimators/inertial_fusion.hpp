@@ -16,7 +16,7 @@
 // Rejections: a source that is gated reject_count times in a row over reject_time_s is believed again: the covariance
 // is widened by what it says (kRecovered), and if that does not help, the filter starts anew where GPS says.
 // Stamps of GPS that are off: gps_lag_watch.hpp compares the way of the fixes with that of the IMU by itself, from the
-// filter's state at the beginning of each window (kGpsStampsDoubtful).
+// filter's state at the beginning of each window (kGpsStampsDoubtful). Of odometry: stamp_watch.hpp (kStampsDoubtful).
 //
 // Not observable: heading without GPS motion, magnetometer or absolute odometry; scale without acceleration. After a
 // start in motion with odometry alone, velocity and scale can only be found together, which a linearised filter gets
@@ -36,6 +36,7 @@
 #include "libloc/estimators/gps_lag_watch.hpp"
 #include "libloc/estimators/gps_position.hpp"
 #include "libloc/estimators/heading_bank.hpp"
+#include "libloc/estimators/stamp_watch.hpp"
 #include "libloc/estimators/stand_still.hpp"
 #include "libloc/geometry/geodesy.hpp"
 
@@ -123,6 +124,8 @@ class InertialFusion {
   const StandStillDetector& stand_still() const { return rest_; }
   /// What the fixes say of their own stamps.
   const GpsLagWatch& lag_watch() const { return lag_; }
+  /// Whether the stamps of odometry and gyroscope fit (kStampsDoubtful).
+  const StampWatch& stamp_watch() const { return stamps_; }
   const InertialFusionOptions& options() const { return options_; }
 
  private:
@@ -197,6 +200,7 @@ class InertialFusion {
   bool odometry_used_ = false;
   OdometryMeasurement seen_;        // absolute pose that motion is looked for against
   TimeNs gps_before_ns_ = kNoTime;  // of the fix before this one
+  StampWatch stamps_;               // of odometry
   GpsLagWatch lag_;
   ImuReckoning reckoning_;
   bool reckoning_used_ = false;  // a fix of the window was compared with it

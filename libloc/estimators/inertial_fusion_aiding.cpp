@@ -174,6 +174,7 @@ void InertialFusion::fuse(const OdometryMeasurement& odometry) {
     return;
   }
   look_for_motion(odometry, position_cov);
+  stamps_.see(odometry);
   const bool clones = options_.filter.clones > 0;
   if (odometry.start_time_ns != kNoTime) {
     if (!clones || odometry.start_time_ns >= odometry.time_ns || odometry.rotation.coeffs().hasNaN()) {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "libloc/geometry/so3.hpp"
+
 namespace loc {
 namespace {
 
@@ -40,10 +42,13 @@ double StampWatch::offset_s() const {
   return sigma_s_ <= kWellKnown && std::abs(fine_s_ - offset_s_) <= kAgree ? fine_s_ : offset_s_;
 }
 
-StampWatch::StampWatch(const CameraCalibration& camera)
-    : camera_(camera),
-      body_camera_(camera.T_body_camera.rotation.toRotationMatrix()),
-      offset_ns_(from_seconds(camera.time_offset_s)) {
+StampWatch::StampWatch(const CameraCalibration& camera) : StampWatch() {
+  camera_.emplace(camera);
+  body_camera_ = camera.T_body_camera.rotation.toRotationMatrix();
+  offset_ns_ = from_seconds(camera.time_offset_s);
+}
+
+StampWatch::StampWatch() {
   // Room for all, so that nothing is allocated later.
   for (std::size_t i = 0; i <= kMost; ++i) angles_.push_back(angle_);
   while (!angles_.empty()) angles_.drop_front();
@@ -90,7 +95,7 @@ bool StampWatch::turn_between(const FeaturesMeasurement& frame, Eigen::Vector3d&
     const auto before = std::lower_bound(last_.begin(), last_.end(), feature.id,
                                          [](const auto& entry, std::int64_t id) { return entry.first < id; });
     if (before == last_.end() || before->first != feature.id || !feature.pixel_px.allFinite()) continue;
-    if (const auto ray = camera_.unproject(feature.pixel_px)) pairs_.emplace_back(before->second, *ray);
+    if (const auto ray = camera_->unproject(feature.pixel_px)) pairs_.emplace_back(before->second, *ray);
   }
   if (pairs_.size() < kFewestFeatures) return false;
   turn.setZero();
@@ -109,28 +114,56 @@ bool StampWatch::turn_between(const FeaturesMeasurement& frame, Eigen::Vector3d&
 }
 
 void StampWatch::see(const FeaturesMeasurement& frame) {
+  if (!camera_) return;
   const bool follows = frame_ns_ != kNoTime && frame.time_ns > frame_ns_ && frame.time_ns - frame_ns_ <= kGap;
   Eigen::Vector3d turn;
   if (follows && turn_between(frame, turn)) {
     const double dt = to_seconds(frame.time_ns - frame_ns_);
     turns_.push_back({frame_ns_ + offset_ns_, frame.time_ns + offset_ns_, body_camera_ * turn / dt});
   } else if (!follows) {
-    while (!turns_.empty()) turns_.drop_front();
-    judged_ns_ = kNoTime;
-  }
-  frame_ns_ = frame.time_ns;
-  while (!turns_.empty() && turns_.back().end_ns - turns_.front().begin_ns > kWindow + 2 * kFarthest) {
-    turns_.drop_front();
+    begin_anew();
   }
   last_.clear();
   for (const FeatureObservation& feature : frame.features) {
     if (!feature.pixel_px.allFinite()) continue;
-    if (const auto ray = camera_.unproject(feature.pixel_px)) last_.emplace_back(feature.id, *ray);
+    if (const auto ray = camera_->unproject(feature.pixel_px)) last_.emplace_back(feature.id, *ray);
   }
   std::sort(last_.begin(), last_.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  if (judged_ns_ == kNoTime) judged_ns_ = frame.time_ns;
-  if (frame.time_ns - judged_ns_ < kEvery) return;
-  judged_ns_ = frame.time_ns;
+  follow(frame.time_ns);
+}
+
+void StampWatch::see(const OdometryMeasurement& odometry) {
+  if (odometry.time_ns == kNoTime || !odometry.rotation.coeffs().allFinite()) return;
+  const bool relative = odometry.start_time_ns != kNoTime;
+  const TimeNs from = relative ? odometry.start_time_ns : frame_ns_;
+  const bool follows = from != kNoTime && odometry.time_ns > from &&
+                       apart_s(odometry.time_ns, from) <= to_seconds(kGap) &&
+                       (frame_ns_ == kNoTime ||
+                        (odometry.time_ns > frame_ns_ && apart_s(odometry.time_ns, frame_ns_) <= to_seconds(kGap)));
+  if (follows) {
+    const Eigen::Quaterniond turned = relative ? odometry.rotation : pose_.conjugate() * odometry.rotation;
+    turns_.push_back({from, odometry.time_ns, so3::log(turned.normalized()) / to_seconds(odometry.time_ns - from)});
+  } else {
+    begin_anew();
+  }
+  pose_ = odometry.rotation;
+  follow(odometry.time_ns);
+}
+
+void StampWatch::begin_anew() {
+  while (!turns_.empty()) turns_.drop_front();
+  judged_ns_ = kNoTime;
+}
+
+// After the turn that ends at this time.
+void StampWatch::follow(TimeNs time_ns) {
+  frame_ns_ = time_ns;
+  while (!turns_.empty() && turns_.back().end_ns - turns_.front().begin_ns > kWindow + 2 * kFarthest) {
+    turns_.drop_front();
+  }
+  if (judged_ns_ == kNoTime) judged_ns_ = time_ns;
+  if (time_ns - judged_ns_ < kEvery) return;
+  judged_ns_ = time_ns;
   judge();
 }
 

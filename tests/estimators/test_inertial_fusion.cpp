@@ -717,6 +717,8 @@ TEST(InertialFusion, AReceiverThatBoastsIsSurvived) {
 // A winding road, from rest on; fixes at 1 Hz are where the body was late_s before their stamps. Level, x forward.
 struct WindingDrive {
   double late_s = 0;
+  std::optional<double> odometry_late_s{};
+  double looks_about = 0;  ///< [rad]
   double gps_sigma = 1;
   InertialFusionOptions options = white_fixes();
   LocalFrame world{0.85, 0.2, 300};
@@ -737,7 +739,8 @@ struct WindingDrive {
     const double start = heading;
     const auto heading_at = [&](double t) {
       const Eigen::Vector3d v = (place(t + kH) - place(t - kH)) / (2 * kH);
-      return v.norm() < 1e-3 ? start : std::atan2(v.y(), v.x());
+      const double about = t < 7 ? 0 : looks_about * (std::sin(1.7 * (t - 7)) + 0.7 * std::sin(3.1 * (t - 7)));
+      return (v.norm() < 1e-3 ? start : std::atan2(v.y(), v.x())) + about;
     };
     for (int i = 0; i <= duration_s * kRate; ++i) {
       const double t = i / kRate;
@@ -762,10 +765,33 @@ struct WindingDrive {
       imu.specific_force =
           Eigen::AngleAxisd(-heading, Eigen::Vector3d::UnitZ()) * (acceleration + Eigen::Vector3d(0, 0, 9.80665)) +
           Eigen::Vector3d(0.05, -0.04, 0.03) + 0.03 * random.normal3();
+      if (odometry_late_s && i % 10 == 0) {
+        OdometryMeasurement odometry;
+        const double then = t - *odometry_late_s;
+        odometry.time_ns = from_seconds(t);
+        odometry.position = place(then) + 0.05 * random.normal3();
+        odometry.rotation =
+            Eigen::AngleAxisd(heading_at(then), Eigen::Vector3d::UnitZ()) * so3::exp(0.002 * random.normal3());
+        odometry.position_cov = 0.05 * 0.05 * Eigen::Matrix3d::Identity();
+        odometry.orientation_cov = 4e-6 * Eigen::Matrix3d::Identity();
+        fusion->process(odometry);
+      }
       if (fusion->process(imu)) statuses |= fusion->estimate().status;
     }
   }
 };
+
+TEST(InertialFusion, StampsOfOdometryThatAreOffAreTold) {
+  for (const double late : {0.0, 1.0, -1.0}) {
+    WindingDrive d;
+    d.odometry_late_s = late;
+    d.looks_about = 0.2;
+    d.run(150, 4);
+    EXPECT_EQ((d.statuses & kStampsDoubtful) != 0, late != 0) << late << ": " << d.fusion->stamp_watch().offset_s();
+    EXPECT_NEAR(d.fusion->stamp_watch().offset_s(), -late, 0.1);
+    EXPECT_EQ(count(d.fusion->counts(), "stamps.odometry_to_add_ms") != 0, late != 0);
+  }
+}
 
 TEST(InertialFusion, StampsOfGpsThatAreOffAreTold) {
   for (const double late : {0.0, 1.0, -1.0}) {

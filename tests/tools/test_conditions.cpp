@@ -66,7 +66,7 @@ TEST(Conditions, SayByHowMuchAndWhatToDo) {
   }
   EXPECT_EQ(with_detail, 1);
   const std::string log = testing::internal::GetCapturedStdout();
-  EXPECT_NE(log.find("condition=\"stamps of camera and IMU doubtful\" time=1.000000000 detail=\"-22 ms\" hint="),
+  EXPECT_NE(log.find("condition=\"stamps of camera (odometry) and IMU doubtful\" time=1.000000000 detail=\"-22 ms\" hint="),
             std::string::npos)
       << log;
   EXPECT_NE(log.find("loc-calibrate camera"), std::string::npos) << log;

@@ -238,6 +238,9 @@ std::string AnyEstimator::detail_of(std::uint32_t bit) const {
   if (bit == kStampsDoubtful && inertial != nullptr) {
     return to_add("the camera's stamps", inertial->stamp_watch().offset_s(), inertial->stamp_watch().sigma_s());
   }
+  if (bit == kStampsDoubtful && fusion != nullptr) {
+    return to_add("the odometry's stamps", fusion->stamp_watch().offset_s(), fusion->stamp_watch().sigma_s());
+  }
   if (bit == kGpsStampsDoubtful && (anchor_ || fusion != nullptr)) {
     const GpsLagWatch& watch = anchor_ ? anchor_->lag_watch() : fusion->lag_watch();
     return to_add("the fixes' stamps", watch.offset_s(), watch.sigma_s());

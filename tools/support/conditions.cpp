@@ -19,7 +19,7 @@ const char* hint_of(std::uint32_t bit) {
     case kCalibrationDoubtful:
       return "calibrate the camera's intrinsics anew: loc-calibrate camera";
     case kStampsDoubtful:
-      return "mend the stamps of camera or IMU, or add it to time_offset_s of the camera in the rig";
+      return "mend the stamps of either, or add it to time_offset_s of the camera in the rig";
     case kGpsStampsDoubtful:
       return "mend the stamps of GPS, or add it to time_offset_s of the GPS in the rig";
     default:
@@ -30,20 +30,21 @@ const char* hint_of(std::uint32_t bit) {
 }  // namespace
 
 const std::array<Condition, Conditions::kConditions>& Conditions::known() {
-  static constexpr std::array<Condition, kConditions> kAll = {{{kNoImages, "no images"},
-                                                               {kNoImu, "no IMU"},
-                                                               {kNoGps, "no GPS"},
-                                                               {kLost, "lost"},
-                                                               {kFewFeatures, "few features"},
-                                                               {kFeaturesRejected, "features rejected"},
-                                                               {kGpsRejected, "GPS rejected"},
-                                                               {kOdometryRejected, "odometry rejected"},
-                                                               {kCalibrationDoubtful, "calibration doubtful"},
-                                                               {kMapLinkUnknown, "link to the map from before unknown"},
-                                                               {kStampsDoubtful, "stamps of camera and IMU doubtful"},
-                                                               {kGpsStampsDoubtful, "stamps of GPS doubtful"},
-                                                               {kTiltDoubtful, "tilt doubtful"},
-                                                               {kMagnetometerDisturbed, "magnetometer disturbed"}}};
+  static constexpr std::array<Condition, kConditions> kAll = {
+      {{kNoImages, "no images"},
+       {kNoImu, "no IMU"},
+       {kNoGps, "no GPS"},
+       {kLost, "lost"},
+       {kFewFeatures, "few features"},
+       {kFeaturesRejected, "features rejected"},
+       {kGpsRejected, "GPS rejected"},
+       {kOdometryRejected, "odometry rejected"},
+       {kCalibrationDoubtful, "calibration doubtful"},
+       {kMapLinkUnknown, "link to the map from before unknown"},
+       {kStampsDoubtful, "stamps of camera (odometry) and IMU doubtful"},
+       {kGpsStampsDoubtful, "stamps of GPS doubtful"},
+       {kTiltDoubtful, "tilt doubtful"},
+       {kMagnetometerDisturbed, "magnetometer disturbed"}}};
   return kAll;
 }
 
