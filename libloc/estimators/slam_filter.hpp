@@ -245,12 +245,12 @@ class SlamFilter {
   double frame_sigma_px_ = kUnknown;
 
   // Where the last frames were found.
-  bool found_ = true;               // the last one
-  bool lost_ = false;               // none for too long
-  bool refound_ = false;            // by the frame at hand
-  std::int64_t found_frame_ = -1;   // the last one that was; -1: none yet
-  std::int64_t left_frame_ = -1;    // the last one of the map that it has left for new surroundings; -1: none
-  double usual_speed_ = 0;          // while found [unit/s]
+  bool found_ = true;              // the last one
+  bool lost_ = false;              // none for too long
+  bool refound_ = false;           // by the frame at hand
+  std::int64_t found_frame_ = -1;  // the last one that was; -1: none yet
+  std::int64_t left_frame_ = -1;   // the last one of the map that it has left for new surroundings; -1: none
+  double usual_speed_ = 0;         // while found [unit/s]
   double usual_log_inverse_depth_ = kUnknown;  // of what was seen lately
   TimeNs usual_depth_ns_ = kNoTime;
   TimeNs found_ns_ = kNoTime;       // its time

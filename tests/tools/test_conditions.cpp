@@ -66,8 +66,9 @@ TEST(Conditions, SayByHowMuchAndWhatToDo) {
   }
   EXPECT_EQ(with_detail, 1);
   const std::string log = testing::internal::GetCapturedStdout();
-  EXPECT_NE(log.find("condition=\"stamps of camera (odometry) and IMU doubtful\" time=1.000000000 detail=\"-22 ms\" hint="),
-            std::string::npos)
+  EXPECT_NE(
+      log.find("condition=\"stamps of camera (odometry) and IMU doubtful\" time=1.000000000 detail=\"-22 ms\" hint="),
+      std::string::npos)
       << log;
   EXPECT_NE(log.find("loc-calibrate camera"), std::string::npos) << log;
   EXPECT_NE(log.find("condition=\"lost\" time=1.000000000\n"), std::string::npos) << log;
