@@ -218,6 +218,8 @@ std::optional<double> better_spacing(const CalibrationTarget& target, const Prob
 // Pictures that follow each other hang together as well: the same blur, the same part of the lens. With more groups
 // they would not be long enough, with fewer their scatter says little about eight parameters.
 constexpr std::size_t kGroupsForScatter = 16;
+// Of the deviations from 16 - 8 degrees of freedom by chance: the root of the 99 % quantile of chi square over them.
+constexpr double kMoreThanChance = 1.58;
 
 void find_covariance(const Problem& problem, CameraFit& fit) {
   const auto information = calib::information_of(problem.camera, problem.views);
@@ -232,16 +234,18 @@ void find_covariance(const Problem& problem, CameraFit& fit) {
   fit.covariance.topLeftCorner(n, n) = fit.noise_px * fit.noise_px * *inverse;
   const std::size_t views = information.pulls.size();
   if (views < kGroupsForScatter) return;
-  fit.sigma_by_views.setZero();
-  for (const std::size_t groups : {views, std::min(views, kGroupsForScatter)}) {
+  const auto scatter = [&](std::size_t groups) {
     Eigen::MatrixXd pulls = Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(groups));
     for (std::size_t i = 0; i < views; ++i) {
       pulls.col(static_cast<Eigen::Index>(i * groups / views)) += information.pulls[i].head(n);
     }
     const auto m = static_cast<double>(groups);
-    const Eigen::VectorXd sigma = (*inverse * pulls).rowwise().norm() * std::sqrt(m / (m - n));
-    fit.sigma_by_views.head(n) = fit.sigma_by_views.head(n).cwiseMax(sigma);
-  }
+    return Eigen::VectorXd((*inverse * pulls).rowwise().norm() * std::sqrt(m / (m - n)));
+  };
+  const Eigen::VectorXd single = scatter(views);
+  const Eigen::VectorXd runs = scatter(kGroupsForScatter);
+  fit.sigma_by_views.setZero();
+  fit.sigma_by_views.head(n) = (runs.array() > kMoreThanChance * single.array()).select(runs, single);
 }
 
 void fill_views(const Problem& problem, CameraFit& fit) {
