@@ -74,7 +74,7 @@ Rig full_rig() {
     camera.time_offset_s = -1.0 / 7;
     camera.rate_hz = 20;
     camera.intrinsics_quality = full_intrinsics_quality(random);
-    if (i == 1) camera.intrinsics_quality = IntrinsicsQuality{.method = "target"};  // the rest is not known
+    if (i == 1) camera.intrinsics_quality.emplace().method = "target";  // the rest is not known
     rig.cameras.push_back(camera);
   }
   rig.gps = GpsCalibration{{0.1, -0.2, 1.0 / 3}};

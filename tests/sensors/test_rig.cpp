@@ -153,7 +153,7 @@ TEST(Rig, DoubtsTellOfWarningsAndOfWhatWasForced) {
   rig.imu->accelerometer.quality = good_quality();
   rig.imu->accelerometer.quality->verdict = Verdict::kWarn;
   rig.imu->accelerometer.quality->reasons = {"10 poses"};
-  rig.cameras[0].intrinsics_quality = IntrinsicsQuality{.verdict = Verdict::kWarn, .method = "target"};
+  rig.cameras[0].intrinsics_quality.emplace().verdict = Verdict::kWarn;
   rig.cameras[0].intrinsics_quality->reasons = {"no tilt"};
   const auto found = doubts(rig);
   ASSERT_EQ(found.size(), 3U);
