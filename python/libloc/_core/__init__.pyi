@@ -1375,11 +1375,13 @@ class EstimateStatus(enum.IntFlag):
     FEW_FEATURES: typing.ClassVar[EstimateStatus]
     GAP: typing.ClassVar[EstimateStatus]
     GPS_REJECTED: typing.ClassVar[EstimateStatus]
+    GPS_STAMPS_DOUBTFUL: typing.ClassVar[EstimateStatus]
     INITIALISING: typing.ClassVar[EstimateStatus]
     LOST: typing.ClassVar[EstimateStatus]
     MAGNETOMETER_DISTURBED: typing.ClassVar[EstimateStatus]
     MAGNETOMETER_IGNORED: typing.ClassVar[EstimateStatus]
     MAGNETOMETER_MISSING: typing.ClassVar[EstimateStatus]
+    MAP_LINK_UNKNOWN: typing.ClassVar[EstimateStatus]
     NOT_FINITE: typing.ClassVar[EstimateStatus]
     NO_GPS: typing.ClassVar[EstimateStatus]
     NO_IMAGES: typing.ClassVar[EstimateStatus]
@@ -4672,12 +4674,12 @@ class SlamMapOptions:
     def border_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
-    def cover_radius_px(self) -> float:
+    def cover_radius(self) -> float:
         """
-        Nothing joins the map so near to features that are expected but hidden, and they stay in it for a while. 0: off [px].
+        Nothing joins the map so near to features that are expected but hidden, and they stay in it for a while. A share of the picture's width; 0: off.
         """
-    @cover_radius_px.setter
-    def cover_radius_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    @cover_radius.setter
+    def cover_radius(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def delete_after_tries(self) -> int:
