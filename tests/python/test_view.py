@@ -115,8 +115,8 @@ def started(*arguments):
         [*VIEW, *map(str, arguments)],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env=os.environ | {"PYTHONUNBUFFERED": "1"},
-        # A test run in the background ignores Ctrl-C, and children inherit that.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        # A test run in the background or under nohup ignores these, and children inherit that.
+        preexec_fn=lambda: [signal.signal(n, signal.SIG_DFL) for n in (signal.SIGINT, signal.SIGHUP)],
     ) as process:  # fmt: skip
         try:
             yield process
@@ -239,14 +239,14 @@ def test_two_write_one_file(tmp_path):
 
 
 def test_requests_to_end(monkeypatch):
-    before = signal.getsignal(signal.SIGHUP)
-    with target.Interrupt() as interrupt:
-        assert not interrupt.asked
-        signal.raise_signal(signal.SIGHUP)
-        assert interrupt.asked
-    assert signal.getsignal(signal.SIGHUP) == before
-    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as under nohup
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # ignored when all this runs under nohup
     try:
+        with target.Interrupt() as interrupt:
+            assert not interrupt.asked
+            signal.raise_signal(signal.SIGHUP)
+            assert interrupt.asked
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_DFL
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as under nohup
         with target.Interrupt() as interrupt:
             signal.raise_signal(signal.SIGHUP)
             assert not interrupt.asked
