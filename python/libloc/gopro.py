@@ -2,17 +2,17 @@
 
 What GoPro says of GPMF (github.com/gopro/gpmf-parser) and what is made of it here:
 
-Axes. GoPro names the body's axes X to the left, Y out of the back and Z up (seen by the camera, held upright); the
-tag ORIN says which of them each channel is, small letters reversed. Without the tag the model tells (HERO5, HERO6,
-Fusion), otherwise the HERO5's order is taken and Telemetry.axes_known is False. Samples are given in axes parallel to
-the picture's: x right, y down, z forward, so that at rest and upright the specific force is near (0, -9.8, 0) and the
-rotation from IMU to camera near unity. That is the maker's convention, not a calibration; a published one of a HERO10
-(ORB-SLAM3 settings of the Universal Manipulation Interface) agrees with it to half a degree.
+Axes. GoPro names the body's axes X to the left, Y out of the back and Z up (as the camera sees it, held upright);
+the tag ORIN says which of them each channel is, small letters reversed. Without the tag the model tells (HERO5,
+HERO6, Fusion), otherwise the HERO5's order is taken and Telemetry.axes_known is False. Samples are given in axes
+parallel to the picture's: x right, y down, z forward, so that at rest and upright the specific force is near
+(0, -9.8, 0) and the rotation from IMU to camera near unity. That is the maker's convention, not a calibration; a
+published one of a HERO10 (ORB-SLAM3 settings of the Universal Manipulation Interface) agrees to half a degree.
 
-Times. Zero is the beginning of the first payload, and the video's first picture is taken to be there, too. GPMF has
-no finer tie between the two: a constant of some milliseconds remains, which the calibration of camera and IMU finds.
-Where payloads have microseconds (STMP), samples lie evenly between those; otherwise evenly over the whole track.
-GPS fixes come late by what the receiver takes.
+Times. Zero is the beginning of the first payload, and the video's first picture is taken to be there, too. GPMF
+has no finer tie between the two: a constant of some milliseconds may remain, which the calibration of camera and
+IMU finds. Where payloads have microseconds (STMP), samples lie evenly between those; otherwise evenly over the
+whole track. GPS fixes come late by what the receiver takes.
 """
 
 from __future__ import annotations
@@ -29,7 +29,9 @@ from numpy.typing import NDArray
 
 from libloc._core import DataError, GpsFixType
 
-_MISSING = "reading a GoPro's telemetry needs the Python package telemetry-parser: pip install telemetry-parser"
+_MISSING = (
+    "reading a GoPro's telemetry needs the Python package telemetry-parser: pip install telemetry-parser"
+)
 
 # Rows: right, down and forward in GoPro's X (left), Y (back), Z (up).
 R_CAMERA_GOPRO = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, -1.0, 0.0]])
@@ -40,6 +42,7 @@ _UNITS = {
     "Gyroscope": {"rad/s": 1.0, "deg/s": np.pi / 180, "°/s": np.pi / 180},
     "Accelerometer": {"m/s²": 1.0, "m/s^2": 1.0, "m/s2": 1.0},
 }
+_LATEST_US = 10**15  # thirty years after the camera was switched on
 # As struct names GPMF's type letters.
 _STRUCT = {"b": "b", "B": "B", "s": "h", "S": "H", "l": "i", "L": "I", "f": "f", "d": "d", "j": "q", "J": "Q"}
 
@@ -95,11 +98,15 @@ def read_telemetry(path: str | PathLike[str], *, start_time_ns: int = 0) -> Tele
     """
     start_time_ns: added to all times; the same as that of the video (open_video).
     counts: imu.read; imu.missing, samples that the camera counted but that are not in the file;
+    imu.payloads_uneven, where less than half or more than twice the usual time lies between samples: doubtful;
     imu.skipped.time_not_increasing, .not_finite, .no_accelerometer (outside of its times); gps.read;
     gps.skipped.no_fix, .not_finite, .time_not_increasing.
-    Raises DataError naming file and reason when there is no such telemetry, MissingTelemetryParser.
+    Raises DataError naming file and reason when there is no such telemetry, MissingTelemetryParser, ValueError
+    for a start time beyond 2^62 ns.
     """
     path = Path(path)
+    if abs(start_time_ns) > 2**62:
+        raise ValueError(f"start_time_ns is {start_time_ns}, beyond 2^62")
     payloads, name, duration_s = _parse(path)
     counts: Counter[str] = Counter()
     streams = {}
@@ -108,7 +115,7 @@ def read_telemetry(path: str | PathLike[str], *, start_time_ns: int = 0) -> Tele
         parts = [p[group] for p in payloads if _samples(p.get(group))]
         if not parts:
             raise DataError(f"{path}: no samples of the {group.lower()} in its GoPro telemetry")
-        stream = _stream(path, group, parts, _vectors(path, group, parts))
+        stream = _stream(path, group.lower(), parts, _vectors(path, group, parts))
         rotation, told = _rotation(path, group, parts, name)
         known = known and told
         stream.rows = stream.rows @ rotation.T
@@ -127,8 +134,8 @@ def read_telemetry(path: str | PathLike[str], *, start_time_ns: int = 0) -> Tele
     return Telemetry(path, name, imu, gps, known, stamped, {k: v for k, v in counts.items() if v})
 
 
-def _parse(path: Path) -> tuple[list[dict[str, Any]], str, float]:
-    """The payloads, the camera's name, and how long they last together [s]."""
+def _parse(path: Path) -> tuple[list[dict[str, Any]], str, float | None]:
+    """The payloads, the camera's name, and how long they last together [s], if the parser tells."""
     try:
         import telemetry_parser
     except ImportError:
@@ -144,14 +151,15 @@ def _parse(path: Path) -> tuple[list[dict[str, Any]], str, float]:
         raise
     except BaseException as error:  # a panic of its Rust code is no Exception
         raise DataError(
-            f"{path}: no GoPro telemetry can be read from it (no such track, not a GoPro's video, or damaged): {error}"
+            f"{path}: no GoPro telemetry can be read from it (no such track, not a GoPro's video, or damaged): "
+            f"{error}"
         ) from None
     if camera != "GoPro":
         raise DataError(f"{path}: holds telemetry of {camera}, not of a GoPro")
-    if len(times_ms) < 2:
-        raise DataError(f"{path}: no IMU samples in its GoPro telemetry")
     names = [p.get("Default", {}).get("Name") for p in payloads]
-    name = parser.model or next((n for n in names if n), "GoPro")
+    name = parser.model or next((n for n in names if isinstance(n, str) and n), "GoPro")
+    if len(times_ms) < 2:
+        return payloads, name, None
     step_ms = (times_ms[-1] - times_ms[0]) / (len(times_ms) - 1)
     return payloads, name, step_ms * len(times_ms) / 1000
 
@@ -166,27 +174,30 @@ def _vectors(path: Path, group: str, parts: list[dict[str, Any]]) -> list[NDArra
     out = []
     for part in parts:
         unit = part.get("Unit")
-        if unit not in _UNITS[group]:
-            raise DataError(f"{path}: unit of the {group.lower()} is {unit!r}, not {next(iter(_UNITS[group]))}")
+        if not isinstance(unit, str) or unit not in _UNITS[group]:
+            raise DataError(
+                f"{path}: unit of the {group.lower()} is {unit!r}, not {next(iter(_UNITS[group]))}"
+            )
         try:
             rows = np.array([[v["x"], v["y"], v["z"]] for v in part["Data"]], dtype=float)
-        except (TypeError, KeyError):
+        except (TypeError, KeyError, ValueError):
             raise DataError(f"{path}: samples of the {group.lower()} do not have three axes") from None
-        out.append(rows / _scale(path, group, part) * _UNITS[group][unit])
+        out.append(rows / _scale(path, group.lower(), part) * _UNITS[group][unit])
     return out
 
 
 def _scale(path: Path, group: str, part: dict[str, Any], count: int = 1) -> NDArray[np.float64]:
-    scale = np.atleast_1d(np.array(part.get("Scale", 1), dtype=float))
-    if len(scale) not in (1, count) or not (np.isfinite(scale) & (scale != 0)).all():
-        raise DataError(f"{path}: scale of the {group.lower()} is {part.get('Scale')}")
+    try:
+        scale = np.atleast_1d(np.array(part.get("Scale", 1), dtype=float))
+    except (TypeError, ValueError):
+        scale = np.zeros(1)
+    if scale.ndim != 1 or len(scale) not in (1, count) or not (np.isfinite(scale) & (scale != 0)).all():
+        raise DataError(f"{path}: scale of the {group} is {part.get('Scale')}")
     return scale
 
 
-def _stream(
-    path: Path, group: str, parts: list[dict[str, Any]], rows: list[NDArray[np.float64]]
-) -> _Stream:
-    """With the camera's own count of samples (TSMP), so that a lost payload does not stretch its neighbours."""
+def _stream(path: Path, what: str, parts: list[dict[str, Any]], rows: list[NDArray[np.float64]]) -> _Stream:
+    """With the camera's own count of samples (TSMP), so that a lost payload does not stretch the others."""
     lengths = np.array([len(r) for r in rows])
     starts = np.concatenate(([0], np.cumsum(lengths)[:-1]))
     totals = [part.get("Count") for part in parts]
@@ -194,10 +205,14 @@ def _stream(
         starts = np.array(totals, dtype=np.int64) - lengths
         starts -= starts[0]
         if (starts[1:] < starts[:-1] + lengths[:-1]).any():
-            raise DataError(f"{path}: the count of samples of the {group.lower()} (TSMP) steps back")
+            raise DataError(f"{path}: the count of samples of the {what} (TSMP) steps back")
     index = np.concatenate([start + np.arange(n) for start, n in zip(starts, lengths, strict=True)])
     stamps = [part.get("TimestampUs") for part in parts]
-    stamps_us = np.array(stamps, dtype=np.int64) if all(isinstance(s, int) for s in stamps) else None
+    stamps_us = None
+    if all(isinstance(s, int) for s in stamps):
+        if max(map(abs, stamps)) > _LATEST_US:
+            raise DataError(f"{path}: a time of the {what} (STMP) is {max(stamps, key=abs)} us")
+        stamps_us = np.array(stamps, dtype=np.int64)
     missing = int(index[-1] + 1 - lengths.sum())
     return _Stream(np.concatenate(rows), index, starts, stamps_us, missing)
 
@@ -206,16 +221,16 @@ def _rotation(
     path: Path, group: str, parts: list[dict[str, Any]], model: str
 ) -> tuple[NDArray[np.float64], bool]:
     """From channels to right, down, forward; and whether the order is known."""
-    orders = {part.get("OrientationIn") for part in parts}
-    if len(orders) > 1:
-        raise DataError(f"{path}: the axes of the {group.lower()} (ORIN) change: {sorted(map(str, orders))}")
-    order = orders.pop()
+    order = parts[0].get("OrientationIn")
+    other = next((p.get("OrientationIn") for p in parts if p.get("OrientationIn") != order), order)
+    if other != order:
+        raise DataError(f"{path}: the axes of the {group.lower()} (ORIN) change from {order!r} to {other!r}")
     known = order is not None
     if order is None:
         order = next((o for word, o in _ORDER_OF_MODEL.items() if word.lower() in model.lower()), None)
         known = order is not None
         order = order or "ZXY"
-    if sorted(order.upper()) != ["X", "Y", "Z"]:
+    if not isinstance(order, str) or sorted(order.upper()) != ["X", "Y", "Z"]:
         raise DataError(f"{path}: the axes of the {group.lower()} (ORIN) are {order!r}, not X, Y and Z")
     gopro_of_channels = np.zeros((3, 3))
     for channel, letter in enumerate(order):
@@ -224,16 +239,18 @@ def _rotation(
 
 
 def _times(
-    path: Path, what: str, stream: _Stream, zero_us: int | None, duration_s: float
+    path: Path, what: str, stream: _Stream, zero_us: int | None, duration_s: float | None
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """[ns], and which samples to keep: a payload stamped no later than one before is left out whole."""
     keep = np.ones(len(stream.index), dtype=bool)
     if zero_us is None or stream.stamps_us is None or len(stream.stamps_us) < 2:
         if stream.missing:
             raise DataError(
-                f"{path}: {stream.missing} samples of the {what} are missing, and its payloads have no times (STMP) "
-                "to tell when those that are there were taken"
+                f"{path}: {stream.missing} samples of the {what} are missing, and its payloads have no times "
+                "(STMP) to tell when those that are there were taken"
             )
+        if duration_s is None:
+            raise DataError(f"{path}: nothing tells the times of the {what}")
         return np.rint(stream.index * (duration_s * 1e9 / len(stream.index))).astype(np.int64), keep
     starts, stamps = stream.starts, stream.stamps_us - zero_us
     later = np.ones(len(stamps), dtype=bool)
@@ -247,10 +264,17 @@ def _times(
     # Beyond the last stamp at the mean rate up to it.
     step_us = (stamps[-1] - stamps[0]) / (starts[-1] - starts[0])
     end = stream.index[-1] + 1
-    times_us = np.interp(
-        stream.index, [*starts, end], [*stamps, stamps[-1] + step_us * (end - starts[-1])]
-    )
+    times_us = np.interp(stream.index, [*starts, end], [*stamps, stamps[-1] + step_us * (end - starts[-1])])
     return np.rint(times_us * 1000).astype(np.int64), keep
+
+
+def _uneven(stream: _Stream) -> int:
+    """Payloads between whose samples lies less than half or more than twice as long as usual."""
+    if stream.stamps_us is None or len(stream.stamps_us) < 3:
+        return 0
+    steps = np.diff(stream.stamps_us) / np.diff(stream.starts)
+    usual = np.median(steps)
+    return int(((steps > 2 * usual) | ((steps > 0) & (steps < usual / 2))).sum())
 
 
 def _imu(
@@ -258,13 +282,14 @@ def _imu(
     gyro: _Stream,
     accel: _Stream,
     zero_us: int | None,
-    duration_s: float,
+    duration_s: float | None,
     counts: Counter[str],
 ) -> GoproImu:
     sides = []
     for name, stream in (("gyroscope", gyro), ("accelerometer", accel)):
         times, keep = _times(path, name, stream, zero_us, duration_s)
         counts["imu.skipped.time_not_increasing"] += int((~keep).sum())
+        counts["imu.payloads_uneven"] += _uneven(stream)
         finite = np.isfinite(stream.rows).all(axis=1)
         counts["imu.skipped.not_finite"] += int((keep & ~finite).sum())
         keep &= finite
@@ -304,7 +329,10 @@ def _raw(group: dict[str, Any], key: str) -> Any:
 
 
 def _gps5(path: Path, part: dict[str, Any]) -> NDArray[np.float64]:
-    rows = np.array(part["Data"], dtype=float)
+    try:
+        rows = np.array(part["Data"], dtype=float)
+    except (TypeError, ValueError):
+        rows = np.zeros(0)
     if rows.ndim != 2 or rows.shape[1] != 5:
         raise DataError(f"{path}: fixes (GPS5) do not have five numbers each")
     rows = rows / _scale(path, "GPS5", part, 5)
@@ -316,13 +344,17 @@ def _gps5(path: Path, part: dict[str, Any]) -> NDArray[np.float64]:
 
 
 def _gps9(path: Path, part: dict[str, Any]) -> NDArray[np.float64]:
-    """The parser leaves structures as bytes: 8 of key, type, size and number, then big-endian values as TYPE says."""
-    data, letters = bytes(_raw(part, "GPS9")), _raw(part, "TYPE")
+    """The parser leaves structures as bytes: 8 of key, type, size and number, then values as TYPE says."""
+    raw, letters = _raw(part, "GPS9"), _raw(part, "TYPE")
+    try:
+        data = bytes(raw)
+    except (TypeError, ValueError):
+        raise DataError(f"{path}: fixes (GPS9) are {str(raw)[:40]}, not a structure") from None
     if not isinstance(letters, str) or len(letters) != 9 or any(c not in _STRUCT for c in letters):
         raise DataError(f"{path}: the type of fixes (GPS9) is {letters!r}, not nine numbers")
     form = ">" + "".join(_STRUCT[c] for c in letters)
-    size, repeat = data[5], int.from_bytes(data[6:8], "big")
-    if size != struct.calcsize(form) or len(data) < 8 + size * repeat:
+    size, repeat = int.from_bytes(data[5:6]), int.from_bytes(data[6:8])
+    if len(data) < 8 or size != struct.calcsize(form) or len(data) < 8 + size * repeat:
         raise DataError(f"{path}: fixes (GPS9) of {size} bytes do not fit their type {letters}")
     values = list(struct.iter_unpack(form, data[8 : 8 + size * repeat]))
     rows = np.array(values, dtype=float).reshape(-1, 9) / _scale(path, "GPS9", part, 9)
@@ -333,7 +365,7 @@ def _gps(
     path: Path,
     stream: _Stream | None,
     zero_us: int | None,
-    duration_s: float,
+    duration_s: float | None,
     counts: Counter[str],
     above_sea: bool,
 ) -> GoproGps:
@@ -357,7 +389,7 @@ def _gps(
 
 
 def write_csv(telemetry: Telemetry, path: str | PathLike[str]) -> None:
-    """A recording that libloc.read_recording reads: IMU, and GPS fixes (without deviations: a DOP is none)."""
+    """A recording that libloc.read_recording reads: IMU, and GPS fixes (without deviations: DOP is none)."""
     imu, gps = telemetry.imu, telemetry.gps
     heading = "time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
     numbers = np.column_stack([imu.angular_velocity, imu.specific_force]).tolist()
@@ -367,7 +399,9 @@ def write_csv(telemetry: Telemetry, path: str | PathLike[str]) -> None:
     if len(gps.times_ns):
         heading += ",latitude_rad,longitude_rad,altitude_m,fix"
         empty = ",,,,"
-        fixes = zip(gps.times_ns.tolist(), gps.latitude_longitude_altitude.tolist(), gps.fix.tolist(), strict=True)
+        fixes = zip(
+            gps.times_ns.tolist(), gps.latitude_longitude_altitude.tolist(), gps.fix.tolist(), strict=True
+        )
         lines = [(t, 0, f"{t},,,,,,,{','.join(map(repr, place))},{fix}") for t, place, fix in fixes]
     lines += [(t, 1, f"{t},{','.join(map(repr, row))}{empty}") for t, row in zip(times, numbers, strict=True)]
     lines.sort(key=lambda line: line[:2])

@@ -1,5 +1,5 @@
-"""Writes small MP4 files with a GPMF track, after GoPro's public description of GPMF (github.com/gopro/gpmf-parser):
-what a GoPro writes besides picture and sound."""
+"""Writes small MP4 files with a GPMF track, after GoPro's public description of GPMF
+(github.com/gopro/gpmf-parser): what a GoPro writes besides picture and sound."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _TYPES = {"s": ">i2", "S": ">u2", "l": ">i4", "L": ">u4", "f": ">f4", "J": ">u8"
 
 
 def klv(key: str, kind: str, values, size: int | None = None, repeat: int | None = None) -> bytes:
-    """Key, type, size of one structure, their number, data filled up to 4 bytes. Arrays: one structure a row."""
+    """Key, type, size of one structure, their number, data filled up to 4 bytes. Arrays: a structure a row."""
     if kind in ("c", "?", "U"):
         data = values if isinstance(values, bytes) else values.encode("latin-1")
         size = len(data) if size is None else size
@@ -38,8 +38,8 @@ def _filled(data: bytes) -> bytes:
 
 @dataclass
 class Gopro:
-    """A recording in payloads of one second, as a GoPro makes it. Arrays hold one row per sample, in the order of
-    `orientation` (empty: no such tag, as of a HERO5)."""
+    """A recording in payloads of one second, as a GoPro makes it. Arrays hold one row per sample, in the order
+    of `orientation` (empty: no such tag, as of a HERO5)."""
 
     accl: np.ndarray  # [m/s^2]
     gyro: np.ndarray  # [rad/s]

@@ -24,7 +24,7 @@ def motion(t):
 
 
 def channels(rows, order):
-    """From right, down, forward to what a camera with these axes stores: X left, Y back, Z up; small: reversed."""
+    """From right, down, forward to what a camera stores: X left, Y back, Z up; small letters reversed."""
     axes = {"X": -rows[:, 0], "Y": -rows[:, 2], "Z": -rows[:, 1]}
     return np.stack([axes[c.upper()] * (1 if c.isupper() else -1) for c in order], axis=1)
 
@@ -166,9 +166,18 @@ def test_the_program_warns(tmp_path, capsys):
 def test_a_payload_stamped_earlier_is_left_out(tmp_path):
     path = recording(changed_stamps={2: 500_000}).write(tmp_path / "a.mp4")
     got = gopro.read_telemetry(path)
-    assert got.counts == {"imu.read": 600, "imu.skipped.time_not_increasing": 200}
+    assert got.counts == {
+        "imu.read": 600,
+        "imu.skipped.time_not_increasing": 200,
+        "imu.payloads_uneven": 1,
+    }
     assert (np.diff(got.imu.times_ns) > 0).all()
     check_motion(got.imu.times_ns, got.imu, 600)
+
+
+def test_a_payload_stamped_much_too_late_is_counted(tmp_path):
+    got = gopro.read_telemetry(recording(changed_stamps={3: 60_000_000}).write(tmp_path / "a.mp4"))
+    assert got.counts["imu.payloads_uneven"] == 1
 
 
 def test_a_lost_payload_does_not_shift_the_others(tmp_path):
@@ -253,7 +262,7 @@ def test_files_that_are_none(tmp_path):
     other = write_mp4(tmp_path / "other.mp4", payloads, SECOND_S, "other", format="mett")
     refused(other, "no GoPro telemetry can be read")
     no_imu = [nest("DEVC", klv("DVNM", "c", "HERO9"))] * 3
-    refused(write_mp4(tmp_path / "no_imu.mp4", no_imu, SECOND_S, "HERO9"), "no IMU samples")
+    refused(write_mp4(tmp_path / "no_imu.mp4", no_imu, SECOND_S, "HERO9"), "no samples of the gyroscope")
     made = recording()
     made.accl = made.accl[:0]
     refused(made.write(tmp_path / "no_accl.mp4"), "no samples of the accelerometer")

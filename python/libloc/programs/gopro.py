@@ -4,8 +4,8 @@
     loc-slam GX010042.MP4 --imu recording.csv --config rig.yaml --method inertial-slam --output run
     loc-driver video GX010042.MP4 --imu recording.csv
 
-Times are the video's: its beginning is 0, or what --start-time says (give the video the same). Axes are those of the
-picture, x right, y down, z forward. Needs the Python package telemetry-parser.
+Times are the video's: its beginning is 0, or what --start-time says (give the video the same). Axes are those
+of the picture, x right, y down, z forward. Needs the Python package telemetry-parser.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Raises DataError, OSError or MissingTelemetryParser; its text is for the user."""
+    """Raises DataError, ValueError, OSError or MissingTelemetryParser; its text is for the user."""
     if options.out.exists() and not options.overwrite:
         raise FileExistsError(f"{options.out}: exists already; --overwrite replaces it")
     got = gopro.read_telemetry(options.video, start_time_ns=options.start_time)
@@ -66,7 +66,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = make_parser().parse_args(arguments)
     try:
         run(options)
-    except (DataError, OSError, gopro.MissingTelemetryParser) as error:
+    except (DataError, ValueError, OSError, gopro.MissingTelemetryParser) as error:
         print(f"loc-gopro: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
