@@ -2,17 +2,18 @@
 
 What GoPro says of GPMF (github.com/gopro/gpmf-parser) and what is made of it here:
 
-Axes. GoPro names the body's axes X to the left, Y out of the back and Z up (as the camera sees it, held upright);
-the tag ORIN says which of them each channel is, small letters reversed. Without the tag the model tells (HERO5,
-HERO6, Fusion), otherwise the HERO5's order is taken and Telemetry.axes_known is False. Samples are given in axes
-parallel to the picture's: x right, y down, z forward, so that at rest and upright the specific force is near
-(0, -9.8, 0) and the rotation from IMU to camera near unity. That is the maker's convention, not a calibration; a
-published one of a HERO10 (ORB-SLAM3 settings of the Universal Manipulation Interface) agrees to half a degree.
+Axes. GoPro names the body's axes X to the left, Y out of the back and Z up (as the camera sees it, held
+upright); the tag ORIN says which of them each channel is, small letters reversed. Without the tag the
+model tells (HERO5, HERO6, Fusion), otherwise the HERO5's order is taken and Telemetry.axes_known is
+False. Samples are given in axes parallel to the picture's: x right, y down, z forward, so that at rest
+and upright the specific force is near (0, -9.8, 0) and the rotation from IMU to camera near unity. That
+is the maker's convention, not a calibration; a published one of a HERO10 (ORB-SLAM3 settings of the
+Universal Manipulation Interface) agrees to half a degree.
 
-Times. Zero is the beginning of the first payload, and the video's first picture is taken to be there, too. GPMF
-has no finer tie between the two: a constant of some milliseconds may remain, which the calibration of camera and
-IMU finds. Where payloads have microseconds (STMP), samples lie evenly between those; otherwise evenly over the
-whole track. GPS fixes come late by what the receiver takes.
+Times. Zero is the beginning of the first payload, and the video's first picture is taken to be there,
+too. GPMF has no finer tie between the two: a constant of some milliseconds may remain, which the
+calibration of camera and IMU finds. Where payloads have microseconds (STMP), samples lie evenly between
+those; otherwise evenly over the whole track. GPS fixes come late by what the receiver takes.
 """
 
 from __future__ import annotations
@@ -98,11 +99,11 @@ def read_telemetry(path: str | PathLike[str], *, start_time_ns: int = 0) -> Tele
     """
     start_time_ns: added to all times; the same as that of the video (open_video).
     counts: imu.read; imu.missing, samples that the camera counted but that are not in the file;
-    imu.payloads_uneven, where less than half or more than twice the usual time lies between samples: doubtful;
+    imu.payloads_uneven, where less than half or more than twice the usual time lies between samples;
     imu.skipped.time_not_increasing, .not_finite, .no_accelerometer (outside of its times); gps.read;
     gps.skipped.no_fix, .not_finite, .time_not_increasing.
-    Raises DataError naming file and reason when there is no such telemetry, MissingTelemetryParser, ValueError
-    for a start time beyond 2^62 ns.
+    Raises DataError naming file and reason when there is no such telemetry, MissingTelemetryParser,
+    ValueError for a start time beyond 2^62 ns.
     """
     path = Path(path)
     if abs(start_time_ns) > 2**62:
@@ -151,7 +152,7 @@ def _parse(path: Path) -> tuple[list[dict[str, Any]], str, float | None]:
         raise
     except BaseException as error:  # a panic of its Rust code is no Exception
         raise DataError(
-            f"{path}: no GoPro telemetry can be read from it (no such track, not a GoPro's video, or damaged): "
+            f"{path}: no GoPro telemetry can be read (no such track, not a GoPro's video, or damaged): "
             f"{error}"
         ) from None
     if camera != "GoPro":

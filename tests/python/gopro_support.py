@@ -14,7 +14,7 @@ _TYPES = {"s": ">i2", "S": ">u2", "l": ">i4", "L": ">u4", "f": ">f4", "J": ">u8"
 
 
 def klv(key: str, kind: str, values, size: int | None = None, repeat: int | None = None) -> bytes:
-    """Key, type, size of one structure, their number, data filled up to 4 bytes. Arrays: a structure a row."""
+    """Key, type, size of one structure, their number, data filled up to 4 bytes. Arrays: one a row."""
     if kind in ("c", "?", "U"):
         data = values if isinstance(values, bytes) else values.encode("latin-1")
         size = len(data) if size is None else size
@@ -38,8 +38,8 @@ def _filled(data: bytes) -> bytes:
 
 @dataclass
 class Gopro:
-    """A recording in payloads of one second, as a GoPro makes it. Arrays hold one row per sample, in the order
-    of `orientation` (empty: no such tag, as of a HERO5)."""
+    """A recording in payloads of one second, as a GoPro makes it. Arrays hold one row per sample, in the
+    order of `orientation` (empty: no such tag, as of a HERO5)."""
 
     accl: np.ndarray  # [m/s^2]
     gyro: np.ndarray  # [rad/s]
@@ -121,15 +121,28 @@ def _full(kind: str, *parts: bytes, flags: int = 0) -> bytes:
     return _box(kind, struct.pack(">I", flags), *parts)
 
 
-def write_mp4(path: Path, payloads: list[bytes], second_s: float, model: str, format: str = "gpmd") -> Path:
-    """ftyp, mdat, moov with one track of metadata, every payload lasting second_s."""
+def write_mp4(
+    path: Path,
+    payloads: list[bytes],
+    second_s: float,
+    model: str,
+    format: str = "gpmd",
+    video: Path | None = None,
+) -> Path:
+    """ftyp, mdat, moov with one track of metadata, every payload lasting second_s; after those of another
+    file where one is given."""
     scale = 1000
     each = round(second_s * scale)
-    matrix = struct.pack(">9I", 0x10000, 0, 0, 0, 0x10000, 0, 0, 0, 0x40000000)
-    start = _box("ftyp", b"mp41", struct.pack(">I", 0x20131018), b"mp41")
-    first = len(start) + 8
-    offsets = np.cumsum([first, *map(len, payloads)])[:-1]
     total = each * len(payloads)
+    matrix = struct.pack(">9I", 0x10000, 0, 0, 0, 0x10000, 0, 0, 0, 0x40000000)
+    mvhd = struct.pack(">4IIH", 0, 0, scale, total, 0x10000, 0x100)
+    tracks = _full("mvhd", mvhd, bytes(10), matrix, bytes(24), struct.pack(">I", 2))
+    start = _box("ftyp", b"mp41", struct.pack(">I", 0x20131018), b"mp41")
+    if video is not None:
+        data = video.read_bytes()
+        moov = data.rindex(b"moov") - 4  # the muxer writes it last
+        start, tracks = data[:moov], data[moov + 8 :]
+    offsets = np.cumsum([len(start) + 8, *map(len, payloads)])[:-1]
     count = len(payloads)
     table = _box(
         "stbl",
@@ -151,21 +164,9 @@ def write_mp4(path: Path, payloads: list[bytes], second_s: float, model: str, fo
             table,
         ),
     )
-    header = _full(
-        "tkhd", struct.pack(">5I", 0, 0, 1, 0, total), bytes(16), matrix, struct.pack(">2I", 0, 0), flags=15
-    )
-    movie = _box(
-        "moov",
-        _full(
-            "mvhd",
-            struct.pack(">4IIH", 0, 0, scale, total, 0x10000, 0x100),
-            bytes(10),
-            matrix,
-            bytes(24),
-            struct.pack(">I", 2),
-        ),
-        _box("trak", header, media),
-        _box("udta", _box("FIRM", model.encode())),
-    )
+    identity = struct.pack(">5I", 0, 0, 9, 0, total)
+    header = _full("tkhd", identity, bytes(16), matrix, struct.pack(">2I", 0, 0), flags=15)
+    trak = _box("trak", header, media)
+    movie = _box("moov", tracks, trak, _box("udta", _box("FIRM", model.encode())))
     path.write_bytes(start + _box("mdat", *payloads) + movie)
     return path
