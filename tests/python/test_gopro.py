@@ -1,11 +1,15 @@
 """IMU and GPS of a GoPro's video: files made after the public description of GPMF, with a known motion."""
 
+import json
 import sys
 
 import numpy as np
 import pytest
 from gopro_support import Gopro, klv, nest, write_mp4
 from libloc.programs import gopro as program
+from libloc.programs import slam
+from scipy.spatial.transform import Rotation
+from test_slam_images import RATE_HZ, Ride
 
 import libloc
 from libloc import DataError, gopro
@@ -138,7 +142,7 @@ def test_gps9_and_fixes_without_lock(tmp_path):
 def test_the_program_writes_a_recording(tmp_path, capsys):
     path = recording(gps5=places(SECONDS * 18)).write(tmp_path / "a.mp4")
     out = tmp_path / "recording.csv"
-    assert program.main([str(path), "--out", str(out), "--start-time", "1000"]) == 0
+    assert program.main([str(path), "--out", str(out), "--start-time", "0.000001"]) == 0
     assert "HERO7 Black: IMU over 4.00 s, 199.80 Hz" in capsys.readouterr().out
     got = gopro.read_telemetry(path, start_time_ns=1000)
     r = libloc.read_recording(out)
@@ -154,17 +158,54 @@ def test_the_program_writes_a_recording(tmp_path, capsys):
     assert libloc.read_recording(out).imu.times_ns[0] == 1000
 
 
-def test_beside_pictures(tmp_path):
-    """One file, one clock: the first picture and the first sample are at the start time."""
+def write_video(path, pictures, rate_hz):
     av = pytest.importorskip("av")
-    pictures = tmp_path / "pictures.mp4"
-    with av.open(str(pictures), "w") as container:
-        stream = container.add_stream("mpeg4", rate=30)
-        stream.width, stream.height = 64, 48
-        for k in range(SECONDS * 30):
-            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), 2 * k, np.uint8), format="rgb24")
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=rate_hz)
+        stream.height, stream.width = pictures[0].shape
+        stream.bit_rate = 8_000_000
+        for picture in pictures:
+            frame = av.VideoFrame.from_ndarray(np.repeat(picture[..., None], 3, axis=2), format="rgb24")
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
+
+
+@pytest.mark.skipif(not libloc.HAS_VISION, reason="libloc was built without OpenCV")
+def test_slam_with_a_video_and_its_own_imu(tmp_path):
+    """A ride through a room as a GoPro would record it: loc-gopro, then loc-slam with both."""
+    ride = Ride()
+    start = ride.times_ns[0]
+    assert ride.imu.times_ns[0] == start
+    # The IMU lies parallel to the camera: loc-gopro's axes.
+    mounting = ride.camera.T_body_camera
+    turn = Rotation.from_quat(np.roll(mounting.rotation_wxyz, -1))
+    gyro = turn.inv().apply(ride.imu.angular_velocity)
+    accl = turn.inv().apply(ride.imu.specific_force)
+    ride.camera.T_body_camera = libloc.Pose3([1, 0, 0, 0], turn.inv().apply(mounting.translation))
+    ride.rig.cameras = [ride.camera]
+    libloc.write_rig(tmp_path / "rig.yaml", ride.rig)
+    cameras = libloc.Trajectory(ride.times_ns - start, ride.cameras.q_world_body_wxyz, ride.cameras.position)
+    libloc.write_tum(tmp_path / "truth.tum", cameras)
+    write_video(tmp_path / "pictures.mp4", ride.pictures, RATE_HZ)
+    made = Gopro(channels(accl, "YxZ"), channels(gyro, "YxZ"), second_s=1.0)
+    video = tmp_path / "RIDE.MP4"
+    write_mp4(video, made.payloads(), 1.0, made.model, video=tmp_path / "pictures.mp4")
+
+    imu, out = tmp_path / "imu.csv", tmp_path / "out"
+    assert program.main([str(video), "--out", str(imu)]) == 0
+    arguments = [video, "--imu", imu, "--config", tmp_path / "rig.yaml", "--method", "inertial-slam"]
+    arguments += ["--reference", tmp_path / "truth.tum", "--pose", "camera", "--no-plots", "--output", out]
+    assert slam.main([str(a) for a in arguments]) == 0
+    truth = json.loads((out / "summary.json").read_text())["truth"]
+    assert truth["pairs"] == len(ride.times_ns)
+    assert truth["rmse_m"] < 0.05
+
+
+@pytest.mark.skipif(not libloc.HAS_VISION, reason="libloc was built without OpenCV")
+def test_beside_pictures(tmp_path):
+    """One file, one clock: the first picture and the first sample are at the start time."""
+    pictures = tmp_path / "pictures.mp4"
+    write_video(pictures, [np.full((48, 64), 2 * k, np.uint8) for k in range(SECONDS * 30)], 30)
     made = recording()
     path = write_mp4(tmp_path / "a.mp4", made.payloads(), SECOND_S, made.model, video=pictures)
     start = 1_000_000_000

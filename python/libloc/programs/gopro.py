@@ -18,6 +18,7 @@ import numpy as np
 
 import libloc
 from libloc import DataError, gopro
+from libloc.programs.slam_input import seconds_ns
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -28,7 +29,11 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("video", type=Path, help="of a GoPro: .MP4 or .360, as the camera wrote it")
     parser.add_argument("--out", type=Path, required=True, metavar="CSV", help="the recording to write")
     parser.add_argument(
-        "--start-time", type=int, default=0, metavar="NS", help="time of the video's beginning (%(default)s)"
+        "--start-time",
+        type=seconds_ns,
+        default=0,
+        metavar="S",
+        help="time of the video's beginning (%(default)s)",
     )
     parser.add_argument("--overwrite", action="store_true", help="replace the file of an earlier run")
     return parser
@@ -54,7 +59,9 @@ def run(options: argparse.Namespace) -> None:
     force = np.linalg.norm(got.imu.specific_force, axis=1).mean()
     print(f"{got.model}: IMU over {seconds:.2f} s{rate}, mean specific force {force:.2f} m/s^2")
     if len(got.gps.times_ns):
-        print(f"{len(got.gps.times_ns)} GPS fixes, median DOP {np.median(got.gps.dop):.2f}")
+        dop = got.gps.dop[np.isfinite(got.gps.dop)]
+        precision = f", median DOP {np.median(dop):.2f}" if len(dop) else ""
+        print(f"{len(got.gps.times_ns)} GPS fixes{precision}")
     print(f"wrote {options.out}")
 
 

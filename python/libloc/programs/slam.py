@@ -25,7 +25,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from types import FrameType
 from typing import Any, TextIO
@@ -42,6 +41,7 @@ from libloc.programs.slam_input import (
     method_of,
     read_input,
     saved_state,
+    seconds_ns,
     slam_options,
 )
 from libloc.programs.slam_pictures import Watcher
@@ -55,17 +55,6 @@ def _positive(text: str) -> float:
     if not (np.isfinite(value) and value > 0):
         raise argparse.ArgumentTypeError(f"{text}: must be a positive number")
     return value
-
-
-def _seconds(text: str) -> int:
-    """Seconds as int64 nanoseconds, exactly."""
-    try:
-        time_ns = int((Decimal(text) * 1_000_000_000).to_integral_value())
-    except (InvalidOperation, ValueError, OverflowError):
-        raise argparse.ArgumentTypeError(f"{text}: must be seconds") from None
-    if abs(time_ns) >= 2**62:
-        raise argparse.ArgumentTypeError(f"{text}: is out of range")
-    return time_ns
 
 
 def _index(text: str) -> int:
@@ -123,7 +112,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--start-time",
-        type=_seconds,
+        type=seconds_ns,
         metavar="S",
         help="of frame 0 of a tracks file or the first picture of a folder or video, on the clock of the "
         "recording, --imu or --reference (default: 0)",
