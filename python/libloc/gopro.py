@@ -101,7 +101,7 @@ def read_telemetry(path: str | PathLike[str], *, start_time_ns: int = 0) -> Tele
     counts: imu.read; imu.missing, samples that the camera counted but that are not in the file;
     imu.payloads_uneven, where less than half or more than twice the usual time lies between samples;
     imu.skipped.time_not_increasing, .not_finite, .no_accelerometer (outside of its times); gps.read;
-    gps.skipped.no_fix, .not_finite, .time_not_increasing.
+    gps.skipped.no_fix, .not_a_place, .time_not_increasing.
     Raises DataError naming file and reason when there is no such telemetry, MissingTelemetryParser,
     ValueError for a start time beyond 2^62 ns.
     """
@@ -380,7 +380,7 @@ def _gps(
     counts["gps.skipped.no_fix"] += int((keep & ~lock).sum())
     keep &= lock
     usable = np.isfinite(rows[:, :4]).all(axis=1) & (abs(rows[:, 0]) <= 90) & (abs(rows[:, 1]) <= 180)
-    counts["gps.skipped.not_finite"] += int((keep & ~usable).sum())
+    counts["gps.skipped.not_a_place"] += int((keep & ~usable).sum())
     keep &= usable
     rows = rows[keep]
     place = rows[:, :3] * [np.pi / 180, np.pi / 180, 1]

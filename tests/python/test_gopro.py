@@ -131,7 +131,7 @@ def test_gps9_and_fixes_without_lock(tmp_path):
         "imu.read": 800,
         "gps.read": 34,
         "gps.skipped.no_fix": 5,
-        "gps.skipped.not_finite": 1,
+        "gps.skipped.not_a_place": 1,
     }
     assert np.abs(np.rad2deg(got.gps.latitude_longitude_altitude[:, :2]) - want[6:, :2]).max() < 1e-7
     assert np.allclose(got.gps.dop, 2.25)
