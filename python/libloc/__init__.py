@@ -20,4 +20,4 @@ from libloc.slam import features_of_frames as features_of_frames
 from libloc.slam import features_of_tracks as features_of_tracks
 from libloc.slam import run_slam as run_slam
 
-__version__ = "0.4.0"
+__version__ = "0.5.0"
