@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <span>
+#include <vector>
 
 #include "libloc/calib/spline.hpp"
 #include "libloc/calib/spline_grid.hpp"
@@ -22,5 +23,12 @@ RotationStep step_between(const Eigen::Quaterniond& from, const Eigen::Quaternio
 /// @param weights cumulative; the order is one more than the number of steps
 RotationState rotation_at(const Eigen::Quaterniond& first, std::span<const RotationStep> steps,
                           const SplineWeights& weights, RotationJacobians* jacobians);
+
+/// Fits over a grid that is given. Rotations need times that cover it, in steps well below the spacing. @{
+Eigen::MatrixXd fit_vectors(const SplineGrid& grid, std::span<const double> times_s, const Eigen::MatrixXd& values,
+                            double smoothing);
+std::vector<Eigen::Quaterniond> fit_rotations(const SplineGrid& grid, std::span<const double> times_s,
+                                              std::span<const Pose3> poses, double smoothing);
+/// @}
 
 }  // namespace loc::calib

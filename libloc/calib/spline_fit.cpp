@@ -185,6 +185,22 @@ class RotationFit {
 
 }  // namespace
 
+namespace calib {
+
+Eigen::MatrixXd fit_vectors(const SplineGrid& grid, std::span<const double> times_s, const Eigen::MatrixXd& values,
+                            double smoothing) {
+  return fit_columns(grid, times_s, values, smoothing);
+}
+
+std::vector<Eigen::Quaterniond> fit_rotations(const SplineGrid& grid, std::span<const double> times_s,
+                                              std::span<const Pose3> poses, double smoothing) {
+  RotationFit fit(grid, times_s, poses, smoothing);
+  for (int i = 0; i < 3; ++i) fit.iterate();
+  return fit.take();
+}
+
+}  // namespace calib
+
 void SplineFitOptions::check() const {
   require(order >= kMinSplineOrder && order <= kMaxSplineOrder, "order", order, "must be in [3, 8]");
   require_positive("spacing_s", spacing_s);

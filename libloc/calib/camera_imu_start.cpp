@@ -1,0 +1,287 @@
+#include "libloc/calib/camera_imu_start.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "libloc/calib/least_squares.hpp"
+#include "libloc/core/check.hpp"
+#include "libloc/core/statistics.hpp"
+#include "libloc/geometry/so3.hpp"
+
+namespace loc::calib {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// Between two pictures whose turn is used [s]: long enough that slow motion is more than the poses' noise.
+constexpr double kShortestStep = 0.15;
+constexpr double kLongestStep = 0.4;
+constexpr double kLeastCorrelation = 0.5;
+constexpr double kMostUnexplained = 0.5;  // of the variance of the turn rates
+constexpr double kSecondApart = 0.3;      // [s] from the peak, to count as another one
+constexpr double kLeastOverlap = 0.5;     // of the pictures, or of what the shorter recording allows
+constexpr std::size_t kLeastSteps = 20;
+constexpr double kLeastExcitation = 0.02;  // [rad/s] along the second axis
+constexpr int kRobustRounds = 3;
+
+// A turn of the camera between two pictures.
+struct Turn {
+  double from_s;
+  double to_s;
+  Vector3d rate;  // mean, in camera
+};
+
+std::vector<Turn> turns_of(std::span<const CameraPoseSample> poses) {
+  std::vector<Turn> out;
+  std::size_t to = 0;
+  for (std::size_t from = 0; from < poses.size(); ++from) {
+    while (to < poses.size() && poses[to].t_s - poses[from].t_s < kShortestStep) ++to;
+    if (to == poses.size()) break;
+    const double dt = poses[to].t_s - poses[from].t_s;
+    if (dt > kLongestStep) continue;
+    const Vector3d turn = so3::boxminus(poses[to].T_target_camera.rotation, poses[from].T_target_camera.rotation);
+    out.push_back({poses[from].t_s, poses[to].t_s, turn / dt});
+  }
+  return out;
+}
+
+// Sums over pairs, for a correlation.
+struct PairSums {
+  double n = 0;
+  double x = 0;
+  double y = 0;
+  double xx = 0;
+  double yy = 0;
+  double xy = 0;
+  void add(double a, double b) {
+    n += 1;
+    x += a;
+    y += b;
+    xx += a * a;
+    yy += b * b;
+    xy += a * b;
+  }
+  double correlation() const {
+    const double vx = xx - x * x / n;
+    const double vy = yy - y * y / n;
+    return vx > 0 && vy > 0 ? (xy - x * y / n) / std::sqrt(vx * vy) : 0;
+  }
+};
+
+struct Peak {
+  double offset_s = 0;
+  double correlation = -1;
+  double second = -1;
+};
+
+// Norms of the turn rates know nothing of the rotation between the sensors; all offsets are tried at which half of the
+// pictures (or of the shorter recording) have IMU samples.
+Peak correlate(const std::vector<Turn>& turns, const MeanRate& gyro, double low_s, double high_s) {
+  std::vector<double> lengths;
+  for (const Turn& turn : turns) lengths.push_back(turn.to_s - turn.from_s);
+  const double step = quantile(lengths, 0.5);
+  const double h = step / 8;
+  std::vector<double> norms;
+  for (double t = gyro.begin_s() + step / 2; t <= gyro.end_s() - step / 2; t += h) {
+    norms.push_back(gyro.between(t - step / 2, t + step / 2).norm());
+  }
+  const double first = gyro.begin_s() + step / 2;
+  const double seen = turns.back().to_s - turns.front().from_s;
+  const double possible = std::min(1.0, (gyro.end_s() - gyro.begin_s()) / seen);
+  const double needed = std::max<double>(kLeastSteps, kLeastOverlap * possible * static_cast<double>(turns.size()));
+  std::vector<std::pair<double, double>> found;  // offset and correlation
+  for (double d = low_s; d <= high_s; d += h) {
+    PairSums sums;
+    for (const Turn& turn : turns) {
+      const double at = ((turn.from_s + turn.to_s) / 2 + d - first) / h;
+      if (at < -0.5 || at > static_cast<double>(norms.size()) - 0.5) continue;
+      sums.add(turn.rate.norm(), norms[static_cast<std::size_t>(std::lround(std::max(at, 0.0)))]);
+    }
+    if (sums.n >= needed) found.emplace_back(d, sums.correlation());
+  }
+  Peak peak;
+  for (const auto& [d, c] : found) {
+    if (c > peak.correlation) {
+      peak.correlation = c;
+      peak.offset_s = d;
+    }
+  }
+  for (const auto& [d, c] : found) {
+    if (std::abs(d - peak.offset_s) > kSecondApart) peak.second = std::max(peak.second, c);
+  }
+  return peak;
+}
+
+// rate in camera = R (rate of the gyroscope - bias), least squares with weights.
+struct Wahba {
+  Eigen::Quaterniond R_camera_imu = Eigen::Quaterniond::Identity();
+  Vector3d bias = Vector3d::Zero();
+  double cost = 0;                     // mean square of the residuals, weighted
+  Matrix3d spread = Matrix3d::Zero();  // of the gyroscope's rates
+};
+
+Wahba solve_wahba(const std::vector<Turn>& turns, const MeanRate& gyro, double offset_s, std::vector<double>& weights,
+                  bool reweight) {
+  const std::size_t n = turns.size();
+  std::vector<Vector3d> rates(n);
+  std::vector<bool> covered(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double from = turns[i].from_s + offset_s;
+    const double to = turns[i].to_s + offset_s;
+    covered[i] = from >= gyro.begin_s() && to <= gyro.end_s();
+    rates[i] = gyro.between(from, to);
+  }
+  Wahba out;
+  for (int round = 0; round < (reweight ? kRobustRounds : 1); ++round) {
+    Vector3d x_mean = Vector3d::Zero();
+    Vector3d y_mean = Vector3d::Zero();
+    double sum = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (!covered[i]) continue;
+      x_mean += weights[i] * turns[i].rate;
+      y_mean += weights[i] * rates[i];
+      sum += weights[i];
+    }
+    if (!(sum > 0)) return out;
+    x_mean /= sum;
+    y_mean /= sum;
+    Matrix3d correlation = Matrix3d::Zero();
+    out.spread.setZero();
+    for (std::size_t i = 0; i < n; ++i) {
+      if (!covered[i]) continue;
+      const Vector3d y = rates[i] - y_mean;
+      correlation += weights[i] * (turns[i].rate - x_mean) * y.transpose();
+      out.spread += weights[i] * y * y.transpose();
+    }
+    out.spread /= sum;
+    const Eigen::JacobiSVD<Matrix3d> svd(correlation, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    Matrix3d fix = Matrix3d::Identity();
+    fix(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
+    const Matrix3d R = svd.matrixU() * fix * svd.matrixV().transpose();
+    out.R_camera_imu = Eigen::Quaterniond(R).normalized();
+    out.bias = y_mean - R.transpose() * x_mean;
+    std::vector<double> norms;
+    double cost = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (!covered[i]) continue;
+      norms.push_back((turns[i].rate - R * (rates[i] - out.bias)).norm());
+      cost += weights[i] * norms.back() * norms.back();
+    }
+    out.cost = cost / sum;
+    if (!reweight) break;
+    const double scale = std::max(robust_sigma(norms), 1e-9);
+    std::size_t k = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (covered[i]) weights[i] = tukey_weight(norms[k++] / scale);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+MeanRate::MeanRate(std::span<const ImuRow> imu) {
+  Vector3d sum = Vector3d::Zero();
+  for (std::size_t i = 0; i < imu.size(); ++i) {
+    if (i > 0) sum += 0.5 * (imu[i].gyro + imu[i - 1].gyro) * (imu[i].t_s - imu[i - 1].t_s);
+    times_.push_back(imu[i].t_s);
+    sums_.push_back(sum);
+    rates_.push_back(imu[i].gyro);
+  }
+}
+
+Vector3d MeanRate::integral(double t_s) const {
+  if (t_s <= times_.front()) return sums_.front() + (t_s - times_.front()) * rates_.front();
+  if (t_s >= times_.back()) return sums_.back() + (t_s - times_.back()) * rates_.back();
+  const auto next = static_cast<std::size_t>(std::upper_bound(times_.begin(), times_.end(), t_s) - times_.begin());
+  const double span = times_[next] - times_[next - 1];
+  const double part = t_s - times_[next - 1];
+  // The rate runs straight between two readings.
+  return sums_[next - 1] + part * rates_[next - 1] + 0.5 * part * part / span * (rates_[next] - rates_[next - 1]);
+}
+
+Vector3d MeanRate::between(double from_s, double to_s) const {
+  return (integral(to_s) - integral(from_s)) / (to_s - from_s);
+}
+
+StartResult find_start(std::span<const CameraPoseSample> poses, std::span<const ImuRow> imu,
+                       std::optional<double> given_offset_s) {
+  const std::vector<Turn> turns = turns_of(poses);
+  if (turns.size() < kLeastSteps) {
+    return {{},
+            "The target was seen in too few pictures that follow each other: " + std::to_string(turns.size()) +
+                " pairs, " + std::to_string(kLeastSteps) + " are needed."};
+  }
+  const MeanRate gyro(imu);
+  double low = imu.front().t_s - turns.back().to_s;
+  double high = imu.back().t_s - turns.front().from_s;
+  if (given_offset_s) {
+    low = *given_offset_s - 0.5;
+    high = *given_offset_s + 0.5;
+  }
+  const Peak peak = correlate(turns, gyro, low, high);
+  CameraImuStart out;
+  out.correlation = peak.correlation;
+  out.second_correlation = peak.second;
+  if (peak.correlation < kLeastCorrelation) {
+    return {{},
+            "Camera and gyroscope do not turn alike at any offset of their clocks (correlation " +
+                to_text(std::max(peak.correlation, 0.0), 2) + ", " + to_text(kLeastCorrelation) +
+                " is needed): are both recordings of the same motion, and does the rig turn?"};
+  }
+  std::vector<double> weights(turns.size(), 1.0);
+  Wahba wahba = solve_wahba(turns, gyro, peak.offset_s, weights, true);
+  // Golden section around the peak, with the weights that it gave.
+  const auto cost = [&](double d) { return solve_wahba(turns, gyro, d, weights, false).cost; };
+  const double ratio = (std::sqrt(5.0) - 1) / 2;
+  const double reach = turns.front().to_s - turns.front().from_s;
+  double a = peak.offset_s - reach;
+  double b = peak.offset_s + reach;
+  double c = b - ratio * (b - a);
+  double e = a + ratio * (b - a);
+  double cost_c = cost(c);
+  double cost_e = cost(e);
+  while (b - a > 1e-5) {
+    if (cost_c < cost_e) {
+      b = e;
+      e = c;
+      cost_e = cost_c;
+      c = b - ratio * (b - a);
+      cost_c = cost(c);
+    } else {
+      a = c;
+      c = e;
+      cost_c = cost_e;
+      e = a + ratio * (b - a);
+      cost_e = cost(e);
+    }
+  }
+  out.time_offset_s = (a + b) / 2;
+  wahba = solve_wahba(turns, gyro, out.time_offset_s, weights, true);
+  out.R_camera_imu = wahba.R_camera_imu;
+  out.gyroscope_bias = wahba.bias;
+  const double unexplained = wahba.cost / wahba.spread.trace();
+  if (!(unexplained < kMostUnexplained)) {
+    return {
+        {},
+        "Camera and gyroscope do not turn alike: at the best offset of their clocks no mounting explains more than " +
+            to_text(100 * std::max(0.0, 1 - unexplained), 2) +
+            " % of the turn rates: are both recordings of the same motion?"};
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(wahba.spread, Eigen::EigenvaluesOnly);
+  out.excitation = axes.eigenvalues().reverse().cwiseMax(0).cwiseSqrt();
+  if (out.excitation[1] < kLeastExcitation) {
+    return {{},
+            "The rig turned about one axis only (deviation of the turn rate " + to_text(out.excitation[0], 2) + ", " +
+                to_text(out.excitation[1], 2) + ", " + to_text(out.excitation[2], 2) +
+                " rad/s along its main axes): turn it about all three."};
+  }
+  return {out, ""};
+}
+
+}  // namespace loc::calib

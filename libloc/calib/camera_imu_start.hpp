@@ -1,0 +1,49 @@
+// Start values of the camera-IMU calibration. Internal to calib.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "libloc/calib/camera_imu.hpp"
+
+namespace loc::calib {
+
+/// Times are seconds since an origin that both share.
+struct CameraPoseSample {
+  double t_s = 0;
+  Pose3 T_target_camera;
+};
+struct ImuRow {
+  double t_s = 0;
+  Eigen::Vector3d gyro;
+  Eigen::Vector3d accel;
+};
+
+/// Integral of the gyroscope over time, component by component: mean rates over any interval in constant time.
+class MeanRate {
+ public:
+  explicit MeanRate(std::span<const ImuRow> imu);
+  /// Mean of the readings between two times of the recording [rad/s]; outside, the nearest reading goes on.
+  Eigen::Vector3d between(double from_s, double to_s) const;
+  double begin_s() const { return times_.front(); }
+  double end_s() const { return times_.back(); }
+
+ private:
+  Eigen::Vector3d integral(double t_s) const;
+  std::vector<double> times_;
+  std::vector<Eigen::Vector3d> sums_;  // up to each time
+  std::vector<Eigen::Vector3d> rates_;
+};
+
+struct StartResult {
+  std::optional<CameraImuStart> start;
+  std::string failure;  ///< a sentence, when there is none
+};
+
+/// @param given_offset_s searched in the neighbourhood of this one only (half a second), when there is one
+StartResult find_start(std::span<const CameraPoseSample> poses, std::span<const ImuRow> imu,
+                       std::optional<double> given_offset_s);
+
+}  // namespace loc::calib

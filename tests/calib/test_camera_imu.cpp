@@ -1,0 +1,347 @@
+// Camera-IMU calibration: derivatives, start values, and simulated recordings with known truth.
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "libloc/calib/camera_imu.hpp"
+#include "libloc/calib/camera_imu_problem.hpp"
+#include "libloc/core/random.hpp"
+#include "libloc/core/statistics.hpp"
+#include "libloc/geometry/so3.hpp"
+#include "tests/support/numeric_jacobian.hpp"
+#include "tests/support/sources.hpp"
+#include "tests/support/waved_rig.hpp"
+
+namespace loc {
+namespace {
+
+using calib::CameraImuProblem;
+using calib::CameraImuState;
+using calib::ChainStep;
+using calib::ChainSystem;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using test::expect_data_error;
+using test::near;
+using test::wave;
+using test::WavedRig;
+using test::WavedRigOptions;
+using Vector7d = Eigen::Matrix<double, 7, 1>;
+
+constexpr double kDegree = 0.017453292519943295;
+
+// ---- derivatives
+
+// A short problem with residuals of some size, away from its minimum.
+struct Small {
+  CameraImuProblem problem;
+  CameraImuState state;
+};
+
+Small small_problem(double loss, int order, double bias_spacing_s) {
+  Random random(9);
+  const WavedRig rig = wave({.seconds = 2}, 3);
+  const calib::ChainPlan plan = calib::plan_chain(0, 1.2, 0.02, order, bias_spacing_s);
+  std::vector<calib::ImuRow> imu;
+  for (int i = 0; i < 240; ++i) {
+    const ImuMeasurement& m = rig.imu[static_cast<std::size_t>(i)];
+    imu.push_back({i * 0.005, m.angular_velocity, m.specific_force});
+  }
+  std::vector<calib::FrameRow> frames;
+  for (int i = 0; i < 8; ++i) {
+    calib::FrameRow frame{0.1 * i + 0.103, 0.3, {}};
+    for (const TargetCorner& corner : rig.views[static_cast<std::size_t>(2 * i)].corners) {
+      if (corner.id % 9 == 0) frame.corners.push_back({rig.target.corner(corner.id), corner.pixel_px});
+    }
+    frames.push_back(frame);
+  }
+  CameraImuState state;
+  const Eigen::Quaterniond ahead = Eigen::Quaterniond(0, 1, 0, 0) * rig.T_camera_imu.rotation;
+  for (int i = 0; i < plan.grid.control_points(); ++i) {
+    state.rotations.push_back(so3::boxplus(ahead, 0.05 * random.normal3()));
+  }
+  state.positions = Vector3d(0.16, 0.1, 0.6).replicate(1, plan.grid.control_points()) +
+                    0.01 * MatrixXd::NullaryExpr(3, plan.grid.control_points(), [&] { return random.normal(); });
+  state.biases = 0.01 * MatrixXd::NullaryExpr(6, plan.bias_knots(), [&] { return random.normal(); });
+  state.R_camera_imu = rig.T_camera_imu.rotation;
+  state.t_camera_imu = rig.T_camera_imu.translation;
+  state.offset_s = 0.004;
+  state.gravity = rig.gravity_target;
+  return {CameraImuProblem(Camera(rig.camera), imu, frames, {0.1, 0.5, 0.01, 0.05}, loss, plan), state};
+}
+
+ChainStep nothing(const calib::ChainLayout& layout) {
+  ChainStep step;
+  for (const int n : layout.inner) step.inner.emplace_back(VectorXd::Zero(n));
+  step.node.assign(layout.inner.size() + 1, VectorXd::Zero(layout.node));
+  step.shared = VectorXd::Zero(layout.shared);
+  return step;
+}
+
+// Every unknown of the problem, one after the other: the gradient is that of the cost, robust loss included, whatever
+// unknown it is and wherever in the windows it lies.
+TEST(CameraImuProblem, GradientIsThatOfTheCost) {
+  for (const auto& [order, bias_spacing] : {std::pair(4, 0.1), std::pair(6, 0.4)}) {
+    const auto [problem, state] = small_problem(3, order, bias_spacing);
+    ChainSystem system(problem.layout());
+    problem.evaluate(state, &system);
+    const auto cost = [&](const ChainStep& step) {
+      return problem.evaluate(problem.stepped(state, step), nullptr).total();
+    };
+    ChainStep step = nothing(problem.layout());
+    double largest = 0;
+    const auto check = [&](double& x, const std::string& name) {
+      const double h = 1e-6;
+      x = h;
+      const double plus = cost(step);
+      x = -h;
+      const double minus = cost(step);
+      x = 0;
+      ChainStep unit = step;
+      x = 1;
+      const double slope = system.slope(step);
+      x = 0;
+      const double numeric = (plus - minus) / (2 * h);
+      EXPECT_NEAR(slope, numeric, 1e-5 * std::max(1.0, std::abs(numeric)) + 1e-3) << name;
+      largest = std::max(largest, std::abs(numeric));
+    };
+    for (std::size_t w = 0; w < step.inner.size(); ++w) {
+      for (Index i = 0; i < step.inner[w].size(); i += 5) {
+        check(step.inner[w][i], "inner " + std::to_string(w) + " " + std::to_string(i));
+      }
+    }
+    for (std::size_t w = 0; w < step.node.size(); ++w) {
+      for (Index i = 0; i < step.node[w].size(); ++i) {
+        check(step.node[w][i], "node " + std::to_string(w) + " " + std::to_string(i));
+      }
+    }
+    for (Index i = 0; i < step.shared.size(); ++i) check(step.shared[i], "shared " + std::to_string(i));
+    EXPECT_GT(largest, 100);
+  }
+}
+
+// Where residuals are zero, J^T J is the second derivative: all Jacobians of one problem against their products.
+TEST(CameraImuProblem, MatrixIsTheCurvatureOfTheCost) {
+  auto [problem, state] = small_problem(1e6, 5, 0.2);
+  // What this state would measure.
+  std::vector<calib::ImuRow> imu = problem.imu();
+  MatrixXd residuals = problem.imu_residuals(state);
+  for (std::size_t i = 0; i < imu.size(); ++i) {
+    imu[i].gyro += 0.1 * residuals.col(static_cast<Index>(i)).head<3>();
+    imu[i].accel += 0.5 * residuals.col(static_cast<Index>(i)).tail<3>();
+  }
+  std::vector<calib::FrameRow> frames = problem.frames();
+  const auto corners = problem.corner_residuals(state);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    for (std::size_t c = 0; c < frames[i].corners.size(); ++c) {
+      frames[i].corners[c].pixel += corners[i].col(static_cast<Index>(c));
+    }
+  }
+  state.biases.colwise() = state.biases.col(0).eval();
+  const WavedRig rig = wave({.seconds = 2}, 3);
+  CameraImuProblem exact(Camera(rig.camera), imu, frames, {0.1, 0.5, 0.01, 0.05}, 1e6, problem.plan());
+  {
+    // The biases are even now, so what they were is taken up by the measurements once more.
+    residuals = exact.imu_residuals(state);
+    for (std::size_t i = 0; i < imu.size(); ++i) {
+      imu[i].gyro += 0.1 * residuals.col(static_cast<Index>(i)).head<3>();
+      imu[i].accel += 0.5 * residuals.col(static_cast<Index>(i)).tail<3>();
+    }
+  }
+  const CameraImuProblem zero(Camera(rig.camera), imu, frames, {0.1, 0.5, 0.01, 0.05}, 1e6, problem.plan());
+  const calib::CameraImuCost at_state = zero.evaluate(state, nullptr);
+  ASSERT_LT(at_state.total() - at_state.smoothing, 1e-12);
+  ChainSystem here(zero.layout());
+  zero.evaluate(state, &here);
+  // x^T H x is twice what the cost rises by.
+  Random random(4);
+  for (int trial = 0; trial < 20; ++trial) {
+    ChainStep step = nothing(zero.layout());
+    const auto fill = [&](VectorXd& v, double size) {
+      for (double& x : v) x = size * random.normal();
+    };
+    const double h = 1e-5;
+    // Alone or together: a wrong sign of one block shows in the mixed terms.
+    if (trial % 3 != 0) {
+      for (VectorXd& v : step.inner) fill(v, h);
+      for (VectorXd& v : step.node) fill(v, h);
+    }
+    if (trial % 3 != 1) fill(step.shared, h);
+    double square = 0;
+    for (int w = 0; w < zero.plan().windows; ++w) {
+      const auto at = static_cast<std::size_t>(w);
+      VectorXd x(here.layout().local_size(w));
+      x << step.inner[at], step.node[at], step.node[at + 1], step.shared;
+      square += x.dot(here.matrix(w).selfadjointView<Eigen::Lower>() * x);
+    }
+    ChainStep back = step;
+    for (VectorXd& v : back.inner) v = -v;
+    for (VectorXd& v : back.node) v = -v;
+    back.shared = -back.shared;
+    const double rise = zero.evaluate(zero.stepped(state, step), nullptr).total() +
+                        zero.evaluate(zero.stepped(state, back), nullptr).total() - 2 * at_state.total();
+    EXPECT_NEAR(rise / square, 1, 2e-3) << trial;
+  }
+}
+
+// ---- whole calibrations
+
+CameraImuFit calibrate(const WavedRig& rig, const CameraImuOptions& options = {}) {
+  return calibrate_camera_imu(rig.target, rig.views, rig.camera, rig.imu, ImuNoise{}, options);
+}
+
+Vector7d error_of(const CameraImuFit& fit, const WavedRig& rig, double offset_s) {
+  Vector7d out;
+  out.head<3>() = so3::boxminus(rig.T_camera_imu.rotation, fit.T_camera_imu.rotation);
+  out.segment<3>(3) = rig.T_camera_imu.translation - fit.T_camera_imu.translation;
+  out[6] = offset_s - fit.time_offset_s;
+  return out;
+}
+
+TEST(CameraImu, IsExactWithoutNoise) {
+  const WavedRig rig = wave({.seconds = 20, .corner_sigma_px = 0, .imu_noise = 0, .time_offset_s = 0.0123}, 1);
+  for (const int order : {4, 6}) {
+    const CameraImuFit fit = calibrate(rig, {.order = order, .adapt_noise = false});
+    EXPECT_TRUE(fit.converged);
+    const Vector7d error = error_of(fit, rig, 0.0123);
+    EXPECT_LT(error.head<3>().norm(), 0.001 * kDegree) << order;
+    EXPECT_LT(error.segment<3>(3).norm(), 2e-5) << order;
+    EXPECT_LT(std::abs(error[6]), 1e-6) << order;
+    EXPECT_TRUE(near(fit.gravity_target, rig.gravity_target, 0.003));
+  }
+}
+
+TEST(CameraImu, ErrorsAreAsLargeAsTheirDeviations) {
+  constexpr int kSeeds = 6;
+  double nees = 0;
+  Vector7d squares = Vector7d::Zero();
+  Vector7d variances = Vector7d::Zero();
+  for (int seed = 1; seed <= kSeeds; ++seed) {
+    const WavedRig rig = wave({.seconds = 30}, static_cast<std::uint64_t>(seed));
+    EXPECT_NEAR(rig.turn_rate_rms, 0.9, 0.1);
+    const CameraImuFit fit = calibrate(rig);
+    EXPECT_TRUE(fit.converged);
+    EXPECT_GT(fit.start.correlation, 0.8);
+    const Vector7d error = error_of(fit, rig, 0);
+    nees += error.dot(fit.covariance.ldlt().solve(error));
+    squares += error.cwiseAbs2();
+    variances += fit.sigma_by_noise.cwiseAbs2();
+    EXPECT_TRUE((error.array().abs() < 4 * fit.sigma_by_noise.array()).all()) << error.transpose();
+    EXPECT_TRUE((fit.sigma_by_blocks.array() > 0.3 * fit.sigma_by_noise.array()).all());
+    EXPECT_TRUE((fit.sigma_by_blocks.array() < 3 * fit.sigma_by_noise.array()).all());
+    EXPECT_NEAR(fit.gyroscope_noise_scale, 1, 0.1);
+    EXPECT_NEAR(fit.accelerometer_noise_scale, 1, 0.1);
+    EXPECT_EQ(fit.quality.verdict, Verdict::kOk) << fit.quality.reasons.front();
+    EXPECT_TRUE(std::ranges::all_of(fit.views, &CameraImuView::used));
+  }
+  EXPECT_GT(nees, chi_square_quantile(0.0005, 7 * kSeeds));
+  EXPECT_LT(nees, chi_square_quantile(0.9995, 7 * kSeeds));
+  RecordProperty("nees", std::to_string(nees / kSeeds));
+}
+
+TEST(CameraImu, AnyOffsetGivesTheSame) {
+  const WavedRig rig = wave({.seconds = 20}, 4);
+  const CameraImuFit here = calibrate(rig);
+  for (const double shift : {0.05, -2.0, 3600.0}) {
+    WavedRig moved = rig;
+    for (TargetView& view : moved.views) view.time_ns -= from_seconds(shift);
+    const CameraImuFit fit = calibrate(moved);
+    EXPECT_NEAR(fit.time_offset_s - shift, here.time_offset_s, 1e-7) << shift;
+    EXPECT_TRUE(near(fit.T_camera_imu.translation, here.T_camera_imu.translation, 1e-6)) << shift;
+  }
+  for (const double wrong : {0.08, -0.08}) {
+    const CameraImuFit fit = calibrate(rig, {.time_offset_s = wrong});
+    EXPECT_NEAR(fit.time_offset_s, here.time_offset_s, 1e-7);
+  }
+}
+
+TEST(CameraImu, OutliersAndMissingPicturesDoLittle) {
+  for (const bool missing : {false, true}) {
+    WavedRigOptions options{.seconds = 30};
+    (missing ? options.missing : options.outliers) = missing ? 0.3 : 0.02;
+    double nees = 0;
+    for (int seed = 1; seed <= 3; ++seed) {
+      const WavedRig rig = wave(options, static_cast<std::uint64_t>(seed));
+      const CameraImuFit fit = calibrate(rig);
+      const Vector7d error = error_of(fit, rig, 0);
+      nees += error.dot(fit.covariance.ldlt().solve(error));
+    }
+    EXPECT_LT(nees, chi_square_quantile(0.9999, 21)) << missing;
+  }
+}
+
+TEST(CameraImu, SlowAndShortIsUncertainAndRight) {
+  for (const bool slow : {false, true}) {
+    WavedRigOptions options{.seconds = slow ? 30.0 : 10.0};
+    if (slow) {
+      options.turning *= 0.1;
+      options.moving = 0.1;
+    }
+    double nees = 0;
+    for (int seed = 1; seed <= 3; ++seed) {
+      const WavedRig rig = wave(options, static_cast<std::uint64_t>(seed));
+      const CameraImuFit fit = calibrate(rig);
+      const Vector7d error = error_of(fit, rig, 0);
+      nees += error.dot(fit.covariance.ldlt().solve(error));
+      EXPECT_GT(fit.sigma.segment<3>(3).norm(), slow ? 1e-3 : 2e-4);
+      EXPECT_EQ(fit.quality.verdict == Verdict::kOk, !slow);
+    }
+    EXPECT_LT(nees, chi_square_quantile(0.9999, 21)) << slow;
+  }
+}
+
+TEST(CameraImu, TellsWhatItSaw) {
+  WavedRig rig = wave({.seconds = 15}, 2);
+  for (std::size_t i = 100; i < 110; ++i) rig.views[i].corners.clear();
+  rig.views[120].corners.resize(4);
+  for (TargetCorner& corner : rig.views[130].corners) corner.pixel_px.x() += 30 * (corner.id % 2);
+  const CameraImuFit fit = calibrate(rig);
+  EXPECT_EQ(fit.views[100].reason, "no corners");
+  EXPECT_EQ(fit.views[120].reason, "its corners give no pose");
+  EXPECT_EQ(fit.views[130].reason, "no pose explains its corners");
+  EXPECT_TRUE(fit.views[99].used);
+  EXPECT_NEAR(fit.views[99].rms_px, 0.3 * std::sqrt(2), 0.15);
+  EXPECT_NEAR(fit.views[99].sigma_px, 0.3, 0.08);
+  // Noise that was said ten times too small is found, and told.
+  ImuNoise optimistic;
+  optimistic.gyroscope_noise_density /= 10;
+  optimistic.accelerometer_noise_density /= 10;
+  const CameraImuFit doubtful = calibrate_camera_imu(rig.target, rig.views, rig.camera, rig.imu, optimistic);
+  EXPECT_NEAR(doubtful.gyroscope_noise_scale, 10, 1.5);
+  EXPECT_NEAR(doubtful.accelerometer_noise_scale, 10, 1.5);
+  EXPECT_EQ(doubtful.quality.verdict, Verdict::kFair);
+  EXPECT_TRUE(near(doubtful.T_camera_imu.translation, fit.T_camera_imu.translation, 3e-4));
+  // Stopped: the best so far, and it says so.
+  int calls = 0;
+  const CameraImuFit stopped = calibrate(rig, {.progress = [&](const CameraImuProgress& p) {
+                                           EXPECT_EQ(p.iteration, ++calls);
+                                           return calls < 2;
+                                         }});
+  EXPECT_FALSE(stopped.converged);
+  EXPECT_EQ(stopped.stopped, "interrupted");
+  EXPECT_EQ(stopped.quality.verdict, Verdict::kRefused);
+  EXPECT_TRUE(near(stopped.T_camera_imu.translation, fit.T_camera_imu.translation, 0.01));
+}
+
+TEST(CameraImu, WhatCannotBeSaysWhy) {
+  const auto refused = [](const WavedRigOptions& options, const std::vector<std::string>& parts) {
+    const WavedRig rig = wave(options, 2);
+    expect_data_error([&] { calibrate(rig); }, parts);
+  };
+  refused({.seconds = 20, .turning = {1, 0, 0}}, {"one axis", "all three"});
+  refused({.seconds = 20, .turning = {0, 0, 0}}, {"do not turn alike"});
+  refused({.seconds = 20, .missing = 1}, {"too few pictures"});
+  WavedRig other = wave({.seconds = 20}, 1);
+  other.imu = wave({.seconds = 20}, 7).imu;
+  expect_data_error([&] { calibrate(other); }, {"do not turn alike"});
+  const WavedRig rig = wave({.seconds = 3}, 1);
+  EXPECT_THROW(calibrate(rig, {.order = 2}), std::invalid_argument);
+  EXPECT_THROW(calibrate(rig, {.loss_sigmas = 0}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace loc
