@@ -145,12 +145,17 @@ void MapAnchor::move(const Estimate& in_map) {
   if (last_.time_ns == kNoTime) forget_foreign_fixes(in_map.time_ns);
   const bool guess = (in_map.status & kPoseIsGuess) != 0;
   const bool linked = (in_map.status & kMapLinkUnknown) == 0;
-  const bool linked_again = linked && !std::exchange(linked_, linked);
+  const bool was_linked = std::exchange(linked_, linked);
+  const bool linked_again = linked && !was_linked;
   const bool found = std::exchange(lost_, guess) && !guess && before_;
   if (guess || found || linked_again) lag_.break_off();
   carry(in_map, (found && linked) || linked_again);
-  if (found && linked) find_back();
-  if (found && !linked) go_on_elsewhere();
+  if (found && linked && before_->linked) {
+    find_back();
+  } else if (found || linked_again) {
+    ++counts_[linked ? "anchor.linked_again" : "anchor.went_on_elsewhere"];
+    change_surroundings();
+  }
   see_doubt(in_map);
   const bool keep = history_.empty() || last_.time_ns - history_.back().time_ns >= kPoseEvery;
   if (keep) history_.push_back(last_);
@@ -232,7 +237,7 @@ void MapAnchor::drift(double way) {
 // as well.
 void MapAnchor::see_doubt(const Estimate& in_map) {
   if (lost_ && !before_) {
-    before_ = Before{x_, covariance_, last_.position, accepted_};
+    before_ = Before{x_, covariance_, last_.position, accepted_, linked_};
   }
   if ((in_map.valid & kValidCovariance) == 0) return;
   const double position = in_map.covariance.block<3, 3>(kP, kP).trace() / 3 * square(x_.scale);
@@ -273,12 +278,16 @@ void MapAnchor::find_back() {
   drift(by_map.scale * way.norm());
 }
 
-// It goes on in surroundings that are new to the map: the place is that of the guess, and the unit of a camera alone is
-// another one.
-void MapAnchor::go_on_elsewhere() {
+// It goes on in surroundings that are new to the map, or is back in those that it had left: the place in the world is
+// that of the guess, what was seen so far is in other axes, and the unit of a camera alone is another one.
+void MapAnchor::change_surroundings() {
   before_.reset();
-  ++counts_["anchor.went_on_elsewhere"];
-  if (anchored_ && !options_.scale_known) covariance_(kAnchorScale, kAnchorScale) += square(kNewScaleDoubt);
+  while (!history_.empty()) history_.drop_front();
+  pairs_.clear();
+  tried_at_way_ = -1;
+  if (!anchored_ || options_.scale_known) return;
+  double& variance = covariance_(kAnchorScale, kAnchorScale);
+  variance = std::max(variance, square(kNewScaleDoubt));
 }
 
 bool MapAnchor::refused(GpsRefusal refusal) {

@@ -126,6 +126,7 @@ class MapAnchor {
     Eigen::MatrixXd covariance;
     Eigen::Vector3d in_map = Eigen::Vector3d::Zero();
     std::int64_t fixes = 0;
+    bool linked = true;  // to the map that it is found again in
   };
 
   bool refused(GpsRefusal refusal);
@@ -134,7 +135,7 @@ class MapAnchor {
   void drift(double way);
   void see_doubt(const Estimate& in_map);
   void find_back();
-  void go_on_elsewhere();
+  void change_surroundings();
   void forget_foreign_fixes(TimeNs time_ns);
   void take_waiting();
   std::optional<Pose> pose_at(TimeNs time_ns) const;

@@ -20,6 +20,7 @@ constexpr double kSudden = 0.5;     // for so long: what they have in common cam
 constexpr double kHiddenPart = 0.25;  // of those that are expected
 constexpr double kCoverTime = 1;      // after which it may have gone [s]
 constexpr double kSpeedTime = 2;      // over which the usual speed is averaged [s]
+constexpr double kLongestDoubt = 30;  // [s] over which an unknown velocity is believed to last
 
 }  // namespace
 
@@ -51,7 +52,7 @@ void SlamFilter::lose() {
 // P of place and velocity grows as of a body that has had an unknown velocity since it was last found: less than the
 // model's own acceleration makes of a camera that rests, more of one that drives.
 void SlamFilter::doubt_motion() {
-  const double since = to_seconds(time_ns_ - found_ns_);
+  const double since = std::min(to_seconds(time_ns_ - found_ns_), kLongestDoubt);
   const double variance = unknown_velocity_sigma() * unknown_velocity_sigma();
   Eigen::MatrixXd q = Eigen::MatrixXd::Zero(layout_.dim, layout_.dim);
   for (int i = 0; i < 3; ++i) {

@@ -635,6 +635,38 @@ TEST(MapAnchor, GoingOnElsewhereIsNotFindingBack) {
   }
 }
 
+// Back in the map without having been lost once more: nothing of what was seen elsewhere is mixed with it.
+TEST(MapAnchor, LinkedAgainItsUnitIsOpenOnceMore) {
+  for (const bool inertial : {true, false}) {
+    Ride ride;
+    ride.drifts = false;
+    ride.gps_there = [](double t) { return t < 28 || t > 36; };
+    ride.spoil_pose = [&](double t, Estimate& pose) {
+      if (t < 30 || t > 48) return;
+      const double astray = 2 * std::min(t - 30, 4.0) * std::min(t - 30, 4.0);
+      pose.position.x() += astray;
+      pose.status |= t < 34 ? kLost : kMapLinkUnknown;
+      pose.covariance.block<3, 3>(3, 3) += (0.1 + astray * astray) * Eigen::Matrix3d::Identity();
+    };
+    double before = 0;
+    double after = 0;
+    double at_end = 0;
+    ride.see = [&](double t, const Estimate& e, const Truth& x) {
+      if (t > 47.8 && t < 47.9) before = inertial ? 0 : e.scale_sigma / e.scale;
+      if (t > 48.05 && t < 48.15) after = inertial ? 0 : e.scale_sigma / e.scale;
+      if (t > 59) at_end = std::max(at_end, position_error(e, x));
+    };
+    const MapAnchor anchor = run(ride, white(inertial), 22);
+    EXPECT_EQ(count(anchor.counts(), "anchor.went_on_elsewhere"), 1);
+    EXPECT_EQ(count(anchor.counts(), "anchor.linked_again"), 1);
+    EXPECT_LT(at_end, 3) << inertial;
+    if (!inertial) {
+      EXPECT_LT(before, 0.2);
+      EXPECT_GT(after, 0.3);
+    }
+  }
+}
+
 // A magnetic heading that GPS contradicts for long is not believed again. (A receiver that strays ever further has the
 // anchor begin anew; any other is believed before.)
 TEST(MapAnchor, AHintThatGpsContradictsIsForgotten) {

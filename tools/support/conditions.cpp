@@ -19,7 +19,7 @@ const char* hint_of(std::uint32_t bit) {
     case kCalibrationDoubtful:
       return "calibrate the camera's intrinsics anew: loc-calibrate camera";
     case kStampsDoubtful:
-      return "mend the stamps of either, or add it to time_offset_s of the camera in the rig";
+      return "mend the stamps of either; a camera's: or add it to its time_offset_s in the rig";
     case kGpsStampsDoubtful:
       return "mend the stamps of GPS, or add it to time_offset_s of the GPS in the rig";
     default:
