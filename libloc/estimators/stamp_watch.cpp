@@ -153,6 +153,7 @@ void StampWatch::see(const OdometryMeasurement& odometry) {
 void StampWatch::begin_anew() {
   while (!turns_.empty()) turns_.drop_front();
   judged_ns_ = kNoTime;
+  fine_in_a_row_ = 0;
 }
 
 // After the turn that ends at this time.

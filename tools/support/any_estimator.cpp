@@ -60,7 +60,13 @@ StreamWatchOptions watch_options(const AnyEstimator::Implementation& implementat
 }
 
 std::string to_add(const std::string& what, double offset_s, double sigma_s) {
-  return to_text(1e3 * offset_s, 3) + " ms (deviation " + to_text(1e3 * sigma_s, 2) + ") to add to " + what;
+  const std::string deviation = std::isfinite(sigma_s) ? " (deviation " + to_text(1e3 * sigma_s, 2) + ")" : "";
+  return to_text(1e3 * offset_s, 3) + " ms" + deviation + " to add to " + what;
+}
+
+// The deviation is that of the least squares; without them the offset is one of a coarse search.
+std::string to_add(const std::string& what, const StampWatch& watch) {
+  return to_add(what, watch.offset_s(), watch.offset_s() == watch.fine_s() ? watch.sigma_s() : kUnknown);
 }
 
 constexpr std::array kMethods = {Method{"madgwick", make_madgwick}, Method{"error-state", make_error_state},
@@ -236,10 +242,10 @@ std::string AnyEstimator::detail_of(std::uint32_t bit) const {
   const auto* inertial = std::get_if<InertialSlam>(&implementation_);
   const auto* fusion = std::get_if<InertialFusion>(&implementation_);
   if (bit == kStampsDoubtful && inertial != nullptr) {
-    return to_add("the camera's stamps", inertial->stamp_watch().offset_s(), inertial->stamp_watch().sigma_s());
+    return to_add("the camera's stamps", inertial->stamp_watch());
   }
   if (bit == kStampsDoubtful && fusion != nullptr) {
-    return to_add("the odometry's stamps", fusion->stamp_watch().offset_s(), fusion->stamp_watch().sigma_s());
+    return to_add("the odometry's stamps", fusion->stamp_watch());
   }
   if (bit == kGpsStampsDoubtful && (anchor_ || fusion != nullptr)) {
     const GpsLagWatch& watch = anchor_ ? anchor_->lag_watch() : fusion->lag_watch();
