@@ -81,9 +81,9 @@ struct CameraFit {
   CameraCalibration camera;                ///< name and pose are left as they come: "" and identity
   Matrix8d covariance = Matrix8d::Zero();  ///< of fx fy cx cy and the distortion, from the size of the residuals; zero
                                            ///< for what the model has not
-  /// The same deviations from how differently the pictures pull (sandwich estimator), or 16 runs of pictures that
-  /// follow each other, whichever is larger: more where residuals of one picture or of neighbours hang together, as
-  /// with blur or a lens that the model does not describe. NaN for fewer than 16 pictures.
+  /// The same deviations from how differently the pictures pull (sandwich estimator); from 16 runs of pictures
+  /// that follow each other, where those pull apart by more than chance. Larger where residuals of one picture or of
+  /// neighbours hang together, as with blur or a lens that the model does not describe. NaN for fewer than 16 pictures.
   Vector8d sigma_by_views = Vector8d::Constant(kUnknown);
   double noise_px = kUnknown;            ///< of one coordinate of a corner
   double rms_px = kUnknown;              ///< of the distances of all corners that were used

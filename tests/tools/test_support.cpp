@@ -238,6 +238,16 @@ TEST(FlowControl, GarbageChangesNothing) {
   EXPECT_FALSE(flow.may_send());
   EXPECT_FALSE(flow.answered());
   EXPECT_EQ(flow.garbage(), 2);
+  for (const double value : {std::nan(""), 1e300, -HUGE_VAL}) {
+    statistics_t absurd{};
+    absurd.program = kEstimatorProgram;
+    absurd.name = {"imu.sequence", "imu.camera"};
+    absurd.value = {value, value};
+    absurd.size = 2;
+    flow.on_statistics(encoded(absurd), 0);
+  }
+  EXPECT_EQ(flow.garbage(), 8);
+  EXPECT_EQ(flow.outstanding(), 1);
 }
 
 ImuMeasurement imu_sample(TimeNs time, std::int64_t sequence) {

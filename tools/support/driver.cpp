@@ -167,12 +167,18 @@ void Driver::wait_for_window(StreamKind kind) {
 
 // The end of the recording is not lost in a queue: the driver ends when the estimator has got its last sample.
 void Driver::wait_until_taken() {
-  const TimeNs give_up = steady_now() + from_seconds(options_.answer_timeout_s);
-  TimeNs ask = steady_now() + kAskEvery;
-  while (outstanding() > 0 && !stop_requested()) {
+  TimeNs heard = steady_now();  // last time that something was taken
+  TimeNs ask = heard + kAskEvery;
+  std::int64_t left = outstanding();
+  while (left > 0 && !stop_requested()) {
     poll_answers(kPollMs);
     const TimeNs now = steady_now();
-    if (now > give_up) {
+    if (outstanding() != left) {
+      left = outstanding();
+      heard = now;
+      continue;
+    }
+    if (now - heard > from_seconds(options_.answer_timeout_s)) {
       throw std::runtime_error("the estimator has not answered for the last " + std::to_string(outstanding()) +
                                " samples");
     }

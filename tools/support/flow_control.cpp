@@ -1,6 +1,7 @@
 #include "tools/support/flow_control.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "libloc/core/check.hpp"
 #include "loc/estimate_t.hpp"
@@ -8,6 +9,13 @@
 #include "msgs/decode.hpp"
 
 namespace loc {
+namespace {
+
+// What a double holds exactly, and an int holds.
+constexpr double kMostSequence = 9e15;
+constexpr double kMostCamera = 1e9;
+
+}  // namespace
 
 std::string sequence_name(StreamKind kind) {
   return std::string(stream_name(kind)) + ".sequence";
@@ -72,10 +80,19 @@ void FlowControl::on_statistics(std::span<const std::uint8_t> data, TimeNs now_n
   std::int64_t sequence = -1;
   int camera = 0;
   for (std::size_t i = 0; i < message.name.size(); ++i) {
-    if (message.name[i] == camera_name_) camera = static_cast<int>(message.value[i]);
-    if (message.name[i] != sequence_name_) continue;
-    taken_ = true;
-    sequence = static_cast<std::int64_t>(message.value[i]);
+    const bool is_camera = message.name[i] == camera_name_;
+    if (!is_camera && message.name[i] != sequence_name_) continue;
+    // False for NaN.
+    if (!(std::abs(message.value[i]) <= (is_camera ? kMostCamera : kMostSequence))) {
+      ++garbage_;
+      continue;
+    }
+    if (is_camera) {
+      camera = static_cast<int>(message.value[i]);
+    } else {
+      taken_ = true;
+      sequence = static_cast<std::int64_t>(message.value[i]);
+    }
   }
   if (taken_) acknowledge(sequence, camera);
   if (another) {

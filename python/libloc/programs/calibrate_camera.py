@@ -240,7 +240,8 @@ def _apply(fit: libloc.CameraFit, name: str, rig: libloc.Rig) -> None:
     quality = libloc.IntrinsicsQuality()
     quality.verdict, quality.reasons = fit.quality.verdict, list(fit.quality.reasons)
     quality.method, quality.pictures = "target", fit.views_used
-    quality.intrinsics_sigma_px, quality.distortion_sigma = fit.sigma[:4], fit.sigma[4:]
+    if np.isfinite(fit.sigma).all():  # otherwise the pictures do not determine them
+        quality.intrinsics_sigma_px, quality.distortion_sigma = fit.sigma[:4], fit.sigma[4:]
     quality.reprojection_rms_px = fit.rms_px
     camera.intrinsics_quality = quality
     if at is None:
