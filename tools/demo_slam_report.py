@@ -78,7 +78,8 @@ class Run:
     map_points: dict = field(default_factory=dict)  # id: place, the last that was known to KNOWN_SHARE
     conditions: dict = field(default_factory=dict)  # word: number of messages
     same: list = field(default_factory=list)  # bytes that must be those of another run
-    published: int | None = None  # pictures, as the driver says
+    logged: int = 0  # pictures of all cameras
+    published: int | None = None  # pictures of all cameras, as the driver says
     latency_ms: dict = field(default_factory=dict)
 
     def seconds(self, time_ns) -> np.ndarray:
@@ -118,6 +119,7 @@ def read(path: Path) -> Run:
         elif event.channel == "LOC_MAP":
             add_known_points(run, loc.map_points_t.decode(event.data))
         elif event.channel == "LOC_IMAGE":
+            run.logged += 1
             # Fingerprint, time_ns, host_time_ns, sequence, exposure_ns: 8 bytes each; the camera.
             if int.from_bytes(event.data[40:44], "big") == 0:
                 run.pictures.append((int.from_bytes(event.data[24:32], "big"), event.data))
@@ -148,7 +150,7 @@ def add_known_points(run: Run, message) -> None:
 
 def check_replay(live: Run, replay: Run) -> str:
     """Same estimates, bit for bit, and no picture lost. Returns a sentence for the user."""
-    check_logged("pictures", live.published, len(live.pictures))
+    check_logged("pictures", live.published, live.logged)
     for name, run in (("live", live), ("the replay", replay)):
         if len(run.frames) != len(live.pictures):
             raise ReportError(

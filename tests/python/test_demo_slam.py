@@ -59,11 +59,14 @@ def estimate_message(frame: int, offset: float = 0.0):
     return message
 
 
-def write_log(path, *, pictures=FRAMES, offset=0.0, truth=True):
+def write_log(path, *, pictures=FRAMES, offset=0.0, truth=True, cameras=1):
     log = lcm.EventLog(str(path), "w", overwrite=True)
     for frame in range(FRAMES):
         if frame < pictures:
-            log.write_event(frame, "LOC_IMAGE", picture_message(frame).encode())
+            for camera in range(cameras):
+                image = picture_message(frame)
+                image.camera = camera
+                log.write_event(frame, "LOC_IMAGE", image.encode())
             log.write_event(frame, "LOC_SLAM_FRAME", frame_message(frame).encode())
         # Half of the time 0.1 m too high, half of it too low: no alignment takes that away.
         wrong = 0.1 * (-1) ** frame
@@ -76,7 +79,7 @@ def write_log(path, *, pictures=FRAMES, offset=0.0, truth=True):
         if truth:
             log.write_event(frame, "LOC_REFERENCE", message.encode())
     status = loc.source_status_t()
-    status.streams, status.stream_name, status.published = 1, ["image"], [FRAMES]
+    status.streams, status.stream_name, status.published = 1, ["image"], [cameras * FRAMES]
     log.write_event(99, "LOC_SOURCE_STATUS", status.encode())
     log.close()
     return report.read(path)
@@ -108,6 +111,11 @@ def test_what_differs_or_is_lost_is_refused(tmp_path):
         report.check_replay(write_log(tmp_path / "lost.log", pictures=59), live)
     with pytest.raises(report.ReportError, match="the replay: 50 of 60 pictures"):
         report.check_replay(live, write_log(tmp_path / "late.log", pictures=50))
+
+
+def test_of_two_cameras_one_is_used(tmp_path):
+    live, replay = (write_log(tmp_path / name, cameras=2) for name in ("live.log", "again.log"))
+    assert "60 pictures, none lost" in report.check_replay(live, replay)
 
 
 def test_without_a_truth_the_way_is_shown_as_it_is(tmp_path):
