@@ -238,30 +238,8 @@ StartResult find_start(std::span<const CameraPoseSample> poses, std::span<const 
   Wahba wahba = solve_wahba(turns, gyro, peak.offset_s, weights, true);
   // Golden section around the peak, with the weights that it gave.
   const auto cost = [&](double d) { return solve_wahba(turns, gyro, d, weights, false).cost; };
-  const double ratio = (std::sqrt(5.0) - 1) / 2;
   const double reach = turns.front().to_s - turns.front().from_s;
-  double a = peak.offset_s - reach;
-  double b = peak.offset_s + reach;
-  double c = b - ratio * (b - a);
-  double e = a + ratio * (b - a);
-  double cost_c = cost(c);
-  double cost_e = cost(e);
-  while (b - a > 1e-5) {
-    if (cost_c < cost_e) {
-      b = e;
-      e = c;
-      cost_e = cost_c;
-      c = b - ratio * (b - a);
-      cost_c = cost(c);
-    } else {
-      a = c;
-      c = e;
-      cost_c = cost_e;
-      e = a + ratio * (b - a);
-      cost_e = cost(e);
-    }
-  }
-  out.time_offset_s = (a + b) / 2;
+  out.time_offset_s = golden_section(cost, peak.offset_s - reach, peak.offset_s + reach, 1e-5);
   wahba = solve_wahba(turns, gyro, out.time_offset_s, weights, true);
   out.R_camera_imu = wahba.R_camera_imu;
   out.gyroscope_bias = wahba.bias;

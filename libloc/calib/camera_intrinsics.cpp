@@ -188,29 +188,7 @@ std::optional<double> better_spacing(const CalibrationTarget& target, const Prob
     return result.valid ? result.cost : std::numeric_limits<double>::infinity();
   };
   const double given = std::log(target.spacing);
-  const double ratio = (std::sqrt(5.0) - 1) / 2;
-  double low = given - std::log(3.0);
-  double high = given + std::log(3.0);
-  double left = high - ratio * (high - low);
-  double right = low + ratio * (high - low);
-  double left_cost = cost(left);
-  double right_cost = cost(right);
-  while (high - low > 0.004) {
-    if (left_cost < right_cost) {
-      high = right;
-      right = left;
-      right_cost = left_cost;
-      left = high - ratio * (high - low);
-      left_cost = cost(left);
-    } else {
-      low = left;
-      left = right;
-      left_cost = right_cost;
-      right = low + ratio * (high - low);
-      right_cost = cost(right);
-    }
-  }
-  const double best = (low + high) / 2;
+  const double best = golden_section(cost, given - std::log(3.0), given + std::log(3.0), 0.004);
   // Huber's cost grows linearly with large residuals.
   return cost(best) < 0.5 * cost(given) ? std::optional(std::exp(best)) : std::nullopt;
 }

@@ -99,6 +99,30 @@ double small_sample_factor(int dof) {
   return (z + g1 / n + g2 / (n * n) + g3 / (n * n * n)) / z;
 }
 
+double golden_section(const std::function<double(double)>& cost, double low, double high, double width) {
+  const double ratio = (std::sqrt(5.0) - 1) / 2;
+  double left = high - ratio * (high - low);
+  double right = low + ratio * (high - low);
+  double left_cost = cost(left);
+  double right_cost = cost(right);
+  while (high - low > width) {
+    if (left_cost < right_cost) {
+      high = right;
+      right = left;
+      right_cost = left_cost;
+      left = high - ratio * (high - low);
+      left_cost = cost(left);
+    } else {
+      low = left;
+      left = right;
+      left_cost = right_cost;
+      right = low + ratio * (high - low);
+      right_cost = cost(right);
+    }
+  }
+  return (low + high) / 2;
+}
+
 double robust_sigma(std::span<const double> values) {
   std::vector<double> magnitudes(values.size());
   std::transform(values.begin(), values.end(), magnitudes.begin(), [](double v) { return std::abs(v); });

@@ -43,6 +43,9 @@ std::optional<Eigen::MatrixXd> covariance_from(const Eigen::MatrixXd& informatio
 /// Student's t over the normal quantile. Infinite for dof < 1.
 double small_sample_factor(int dof);
 
+/// Place of the minimum of a function with one minimum in [low, high], to this width, by golden section (Kiefer 1953).
+double golden_section(const std::function<double(double)>& cost, double low, double high, double width);
+
 /// 1.4826 * median(|values|): the deviation of normal values around zero, whatever a minority of them is.
 double robust_sigma(std::span<const double> values);
 
