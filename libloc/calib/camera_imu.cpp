@@ -4,12 +4,18 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <limits>
+#include <map>
 #include <numbers>
 #include <utility>
 
 #include "libloc/calib/camera_bundle.hpp"
+#include "libloc/calib/camera_imu_judge.hpp"
+#include "libloc/calib/camera_imu_knots.hpp"
 #include "libloc/calib/camera_imu_problem.hpp"
 #include "libloc/calib/camera_imu_start.hpp"
+#include "libloc/calib/camera_imu_views.hpp"
+#include "libloc/calib/euler_trajectory.hpp"
 #include "libloc/calib/least_squares.hpp"
 #include "libloc/core/check.hpp"
 #include "libloc/core/statistics.hpp"
@@ -19,152 +25,154 @@ namespace loc {
 namespace {
 
 using calib::CameraImuProblem;
+using calib::CameraImuRecording;
 using calib::CameraImuState;
 using calib::CameraPoseSample;
 using calib::ChainStep;
 using calib::ChainSystem;
 using calib::FrameRow;
 using calib::ImuRow;
+using calib::SharedLayout;
 using Eigen::Vector3d;
 
-constexpr int kLeastCorners = 6;
 constexpr double kMargin = 0.5;   // [s] of IMU samples beyond the pictures
 constexpr double kInside = 0.02;  // [s] that pictures keep from the ends
-constexpr double kWorstPose = 5;  // [px] rms of a picture's corners
 constexpr double kStartSmoothing = 1e-4;
-constexpr double kAlikePeaks = 0.9;
-constexpr double kDoubtfulNoise = 3;
-constexpr double kPulledApart = 2;
 constexpr int kNoiseRounds = 2;
 constexpr double kCommonWeight = 20;        // coordinates of corners that the common noise counts for
 constexpr double kLeastCornerSigma = 0.01;  // [px]
+constexpr double kWidestPitch = 80 * std::numbers::pi / 180;
+constexpr double kLineBand = 8;      // [px] rows that are taken to be read at one time
+constexpr int kCheckBands = 6;       // of an image, where the line delay is only looked at
+constexpr int kWindowsPerGroup = 3;  // of those that pull together
+constexpr int kLeastGroups = 8;
+constexpr int kMostGroups = 24;
+// Deviations of intrinsics that come without any: what two calibrations of one camera usually differ by.
+constexpr double kUsualIntrinsicsSigma = 5e-4;  // of the focal length; of the principal point as a share of it
+constexpr double kUsualDistortionSigma = 1e-3;
+constexpr double kLeastPriorSigma = 1e-9;
 
 double cpu_s() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-struct Recording {
-  TimeNs origin = 0;
-  std::vector<ImuRow> imu;
-  std::vector<FrameRow> frames;
-  std::vector<std::size_t> view_of;  // of each frame
-  std::vector<CameraPoseSample> poses;
+// Attitude of the IMU in target at any time: from each picture to the next by the gyroscope, what is left over spread
+// evenly.
+class RoughAttitude {
+ public:
+  RoughAttitude(const calib::MeanRate& gyro, const CameraImuStart& start, std::span<const CameraPoseSample> poses)
+      : gyro_(gyro), bias_(start.gyroscope_bias) {
+    for (const CameraPoseSample& pose : poses) {
+      times_.push_back(pose.t_s + start.time_offset_s);
+      rotations_.push_back(pose.T_target_camera.rotation * start.R_camera_imu);
+    }
+  }
+  const std::vector<double>& times() const { return times_; }
+  const std::vector<Eigen::Quaterniond>& rotations() const { return rotations_; }
+
+  Eigen::Quaterniond at(double t) const {
+    const auto next = static_cast<std::size_t>(std::upper_bound(times_.begin(), times_.end(), t) - times_.begin());
+    if (next == 0) return turned(0, t);
+    if (next == times_.size()) return turned(next - 1, t);
+    const double share = (t - times_[next - 1]) / (times_[next] - times_[next - 1]);
+    const Vector3d left = so3::boxminus(rotations_[next], turned(next - 1, times_[next]));
+    return so3::boxplus(turned(next - 1, t), share * left);
+  }
+
+ private:
+  Eigen::Quaterniond turned(std::size_t from, double t) const {
+    return rotations_[from] * calib::turn_between(gyro_, bias_, times_[from], t);
+  }
+  const calib::MeanRate& gyro_;
+  Vector3d bias_;
+  std::vector<double> times_;
+  std::vector<Eigen::Quaterniond> rotations_;
 };
 
-Recording read(const CalibrationTarget& target, std::span<const TargetView> views, const CameraCalibration& camera,
-               std::span<const ImuMeasurement> imu, const CameraImuOptions& options, CameraImuFit& fit) {
-  Recording out;
-  if (imu.size() < 2) throw DataError("there are " + std::to_string(imu.size()) + " IMU samples");
-  out.origin = imu.front().time_ns;
-  for (const ImuMeasurement& m : imu) {
-    out.imu.push_back({to_seconds(m.time_ns - out.origin), m.angular_velocity, m.specific_force});
-  }
-  fit.views.resize(views.size());
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    calib::BundleView view;
-    FrameRow frame{to_seconds(views[i].time_ns - out.origin), options.corner_sigma_px, {}};
-    for (const TargetCorner& corner : views[i].corners) {
-      view.corners.push_back({corner.id, target.corner(corner.id), corner.pixel_px, true});
-      frame.corners.push_back({view.corners.back().point, corner.pixel_px});
+// Three angles that go on from sample to sample. @throws DataError where the second is too wide.
+Eigen::MatrixXd continuous_angles(const Eigen::Quaterniond& mean, std::span<const Pose3> poses) {
+  Eigen::MatrixXd out(3, static_cast<Eigen::Index>(poses.size()));
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
+    Vector3d phi = angles_of(mean.conjugate() * poses[i].rotation);
+    if (std::abs(phi.y()) > kWidestPitch) {
+      throw DataError("the rig turned by " + to_text(std::abs(phi.y()) * 180 / std::numbers::pi, 3) +
+                      " deg from its mean attitude: too wide a motion for three angles, take the cumulative form");
     }
-    CameraImuView& report = fit.views[i];
-    if (view.corners.empty()) {
-      report.reason = "no corners";
-      continue;
+    for (const int axis : {0, 2}) {
+      if (i > 0) {
+        const double turns = (out(axis, column - 1) - phi[axis]) / (2 * std::numbers::pi);
+        phi[axis] += 2 * std::numbers::pi * std::round(turns);
+      }
     }
-    if (static_cast<int>(view.corners.size()) < kLeastCorners || !calib::find_pose(camera, view, 1.0)) {
-      report.reason = "its corners give no pose";
-      continue;
-    }
-    double sum = 0;
-    int n = 0;
-    for (const auto& r : calib::residuals_of(Camera(camera), view)) {
-      if (r) sum += r->squaredNorm();
-      ++n;
-    }
-    const double rms = std::sqrt(sum / n);
-    if (rms > kWorstPose) {
-      report.reason = "no pose explains its corners";
-      continue;
-    }
-    out.poses.push_back({frame.t_s, view.T_camera_target.inverse()});
-    out.frames.push_back(std::move(frame));
-    out.view_of.push_back(i);
+    out.col(column) = phi;
   }
   return out;
 }
 
-CameraImuState first_state(const Recording& recording, const calib::ChainPlan& plan, const CameraImuStart& start,
-                           double gravity) {
+CameraImuState first_state(const CameraImuRecording& recording, const calib::ChainPlan& plan,
+                           std::span<const CameraRecording> cameras, CameraImuFit& fit,
+                           const CameraImuOptions& options) {
+  const CameraImuStart& start = fit.cameras.front().start;
+  const auto& poses = recording.cameras.front().poses;
   CameraImuState state;
-  // Rotations: from each picture to the next by the gyroscope, what is left over spread evenly.
-  std::vector<double> times;
-  std::vector<Pose3> poses;
-  std::vector<double> frame_times;
-  Eigen::MatrixXd positions(3, static_cast<Eigen::Index>(recording.poses.size()));
-  std::vector<Eigen::Quaterniond> R_frame;
-  for (std::size_t i = 0; i < recording.poses.size(); ++i) {
-    frame_times.push_back(recording.poses[i].t_s + start.time_offset_s);
-    positions.col(static_cast<Eigen::Index>(i)) = recording.poses[i].T_target_camera.translation;
-    R_frame.push_back(recording.poses[i].T_target_camera.rotation * start.R_camera_imu);
-  }
+  state.form = options.rotation;
   const calib::MeanRate gyro(recording.imu);
-  const auto turn = [&](const Eigen::Quaterniond& from, double from_s, double to_s) {
-    // In steps so small that the mean rate is enough.
-    Eigen::Quaterniond R = from;
-    const int steps = std::max(1, static_cast<int>(std::ceil(std::abs(to_s - from_s) / 0.01)));
-    const double h = (to_s - from_s) / steps;
-    for (int s = 0; s < steps && h != 0; ++s) {
-      const double a = from_s + s * h;
-      const Vector3d rate = h > 0 ? gyro.between(a, a + h) : gyro.between(a + h, a);
-      R = so3::boxplus(R, (rate - start.gyroscope_bias) * h);
-    }
-    return R;
-  };
-  Vector3d force = Vector3d::Zero();
-  std::size_t next = 0;
+  const RoughAttitude attitude(gyro, start, poses);
+  std::vector<double> times;
+  std::vector<Pose3> samples;
   const double step = plan.grid.spacing_s / 2;
   for (double t = plan.grid.start_s; t <= plan.grid.end_s(); t += step) {
-    while (next < frame_times.size() && frame_times[next] <= t) ++next;
-    Eigen::Quaterniond R;
-    if (next == 0) {
-      R = turn(R_frame.front(), frame_times.front(), t);
-    } else if (next == frame_times.size()) {
-      R = turn(R_frame.back(), frame_times.back(), t);
-    } else {
-      const double from = frame_times[next - 1];
-      const double to = frame_times[next];
-      const Vector3d left = so3::boxminus(R_frame[next], turn(R_frame[next - 1], from, to));
-      R = so3::boxplus(turn(R_frame[next - 1], from, t), (t - from) / (to - from) * left);
-    }
     times.push_back(t);
-    poses.push_back({R, Vector3d::Zero()});
+    samples.push_back({attitude.at(t), Vector3d::Zero()});
   }
-  state.rotations = calib::fit_rotations(plan.grid, times, poses, kStartSmoothing);
-  state.positions = calib::fit_vectors(plan.grid, frame_times, positions, kStartSmoothing);
+  if (state.form == RotationForm::kThreeAngles) {
+    state.mean = mean_rotation(attitude.rotations());
+    state.angles = calib::fit_vectors(plan.grid, times, continuous_angles(state.mean, samples), kStartSmoothing);
+  } else {
+    state.rotations = calib::fit_rotations(plan.grid, times, samples, kStartSmoothing);
+  }
+  Eigen::MatrixXd positions(3, static_cast<Eigen::Index>(poses.size()));
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    positions.col(static_cast<Eigen::Index>(i)) = poses[i].T_target_camera.translation;
+  }
+  state.positions = calib::fit_vectors(plan.grid, attitude.times(), positions, kStartSmoothing);
   state.biases = Eigen::MatrixXd::Zero(6, plan.bias_knots());
   state.biases.topRows(3).colwise() = start.gyroscope_bias;
-  state.R_camera_imu = start.R_camera_imu;
-  state.offset_s = start.time_offset_s;
-  const RotationSpline rotation(plan.grid, state.rotations);
-  for (const ImuRow& row : recording.imu) force += rotation.at(row.t_s).rotation * row.accel;
-  state.gravity = -force.normalized() * gravity;
+  Vector3d force = Vector3d::Zero();
+  for (const ImuRow& row : recording.imu) force += attitude.at(row.t_s) * row.accel;
+  state.gravity = -force.normalized() * options.gravity;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    const auto& own = recording.cameras[c].poses;
+    calib::CameraState camera;
+    camera.R_camera_imu = fit.cameras[c].start.R_camera_imu;
+    camera.offset_s = fit.cameras[c].start.time_offset_s;
+    camera.middle_s = (own.front().t_s + own.back().t_s) / 2;
+    camera.camera = cameras[c].camera;
+    if (c > 0) {
+      // The first camera stands where the IMU is; the others where they saw themselves from there.
+      const VectorSpline position(plan.grid, state.positions);
+      for (const CameraPoseSample& pose : own) {
+        const Vector3d imu = position.value(pose.t_s + camera.offset_s);
+        camera.t_camera_imu += pose.T_target_camera.inverse() * imu / static_cast<double>(own.size());
+      }
+    }
+    state.cameras.push_back(std::move(camera));
+  }
   return state;
 }
 
 class Solver {
  public:
-  Solver(const CameraImuProblem& problem, const CameraImuOptions& options, CameraImuFit& fit)
-      : problem_(problem), options_(options), fit_(fit), system_(problem.layout()) {}
+  Solver(const CameraImuProblem& problem, const SharedLayout& shared, const CameraImuOptions& options,
+         CameraImuFit& fit)
+      : problem_(problem), shared_(shared), options_(options), fit_(fit), system_(problem.layout(shared)) {}
 
-  ChainSystem& system() { return system_; }
-
-  /// Levenberg and Marquardt; damping by the gain ratio after Nielsen 1999. @returns the cost; the system is that of
-  /// the state that it leaves.
+  /// Levenberg and Marquardt; damping by the gain ratio after Nielsen 1999. @returns the cost.
   double run(CameraImuState& state) {
     double damping = 1e-8;
     double growth = 2;
-    double cost = problem_.evaluate(state, &system_).total();
+    double cost = problem_.linearise(state, shared_, system_).total();
     ChainStep step;
     fit_.converged = false;
     for (int i = 0; i < options_.max_iterations; ++i) {
@@ -174,17 +182,19 @@ class Solver {
         growth *= 2;
         continue;
       }
-      const CameraImuState next = problem_.stepped(state, step);
-      const double next_cost = problem_.evaluate(next, nullptr).total();
+      const CameraImuState next = problem_.stepped(state, shared_, step);
+      const double next_cost = problem_.cost(next).total();
       const double predicted = -0.5 * system_.slope(step) + 0.5 * damping * system_.damped_square(step);
       const double gain = (cost - next_cost) / std::max(predicted, 1e-300);
-      const bool small = step.shared.segment<3>(calib::kTurn).norm() < 1e-7 &&
-                         step.shared.segment<3>(calib::kShift).norm() < 1e-7 &&
-                         std::abs(step.shared[calib::kOffset]) < 1e-8;
+      const bool small = std::ranges::all_of(shared_.cameras, [&](const SharedLayout::OfCamera& c) {
+        return step.shared.segment<3>(c.first + calib::kTurn).norm() < 1e-7 &&
+               step.shared.segment<3>(c.first + calib::kShift).norm() < 1e-7 &&
+               std::abs(step.shared[c.first + calib::kOffset]) < 1e-8;
+      });
       if (gain > 0 || small) {
         state = next;
         const double old = cost;
-        cost = problem_.evaluate(state, &system_).total();
+        cost = problem_.linearise(state, shared_, system_).total();
         damping = std::max(damping * std::max(0.1, 1 - std::pow(2 * gain - 1, 3)), 1e-12);
         growth = 2;
         if (small && std::abs(old - cost) < 1e-6 * cost) {
@@ -196,7 +206,7 @@ class Solver {
         growth *= 2;
       }
       const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-      if (options_.progress && !options_.progress({fit_.iterations, cost, state.offset_s, elapsed})) {
+      if (options_.progress && !options_.progress({fit_.iterations, cost, state.cameras.front().offset_s, elapsed})) {
         fit_.stopped = "interrupted";
         break;
       }
@@ -210,6 +220,7 @@ class Solver {
 
  private:
   const CameraImuProblem& problem_;
+  const SharedLayout& shared_;
   const CameraImuOptions& options_;
   CameraImuFit& fit_;
   ChainSystem system_;
@@ -234,67 +245,171 @@ void adapt_noise(CameraImuProblem& problem, const CameraImuState& state, double 
   problem.sigmas().accel *= accel;
   fit.gyroscope_noise_scale *= gyro;
   fit.accelerometer_noise_scale *= accel;
-  std::vector<double> all;
+  // By pictures: rows of one picture share its noise.
+  struct OfPicture {
+    std::vector<double> own;
+    std::vector<FrameRow*> frames;
+  };
+  std::map<std::pair<std::size_t, std::size_t>, OfPicture> pictures;
+  std::map<std::size_t, std::vector<double>> all;  // of each camera
   const auto residuals = problem.corner_residuals(state);
-  for (const Eigen::MatrixXd& r : residuals) {
-    for (const double x : r.reshaped()) {
-      if (std::isfinite(x)) all.push_back(x);
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    FrameRow& frame = problem.frames()[i];
+    OfPicture& picture = pictures[{frame.camera, frame.view}];
+    picture.frames.push_back(&frame);
+    for (const double x : residuals[i].reshaped()) {
+      if (!std::isfinite(x)) continue;
+      picture.own.push_back(x);
+      all[frame.camera].push_back(x);
     }
   }
-  const double common = robust_sigma(all);
-  for (std::size_t i = 0; i < residuals.size(); ++i) {
-    std::vector<double> own;
-    for (const double x : residuals[i].reshaped()) {
-      if (std::isfinite(x)) own.push_back(x);
-    }
-    const auto n = static_cast<double>(own.size());
-    const double sigma = own.empty() ? common : robust_sigma(own);
-    problem.frames()[i].sigma_px = std::max(
-        std::sqrt((kCommonWeight * common * common + n * sigma * sigma) / (kCommonWeight + n)), kLeastCornerSigma);
+  std::map<std::size_t, double> common;
+  for (const auto& [camera, values] : all) common[camera] = robust_sigma(values);
+  for (auto& [key, picture] : pictures) {
+    const double usual = common[key.first];
+    const auto n = static_cast<double>(picture.own.size());
+    const double sigma = picture.own.empty() ? usual : robust_sigma(picture.own);
+    const double square = (kCommonWeight * usual * usual + n * sigma * sigma) / (kCommonWeight + n);
+    for (FrameRow* frame : picture.frames) frame->sigma_px = std::max(std::sqrt(square), kLeastCornerSigma);
   }
 }
 
-// What the deviations, the residuals and the start say together.
-void judge(CameraImuFit& fit, std::size_t pictures) {
-  Quality& q = fit.quality;
-  if (!fit.converged) {
-    q.lower_to(Verdict::kRefused, "The solution has not settled" +
-                                      (fit.stopped.empty() ? std::string() : " (" + fit.stopped + ")") +
-                                      ": give it more time, or a better recording.");
+// What both have seen, and a little more of the IMU.
+void keep_common(CameraImuRecording& recording, CameraImuFit& fit) {
+  double begin = recording.imu.back().t_s;
+  double end = recording.imu.front().t_s;
+  for (std::size_t c = 0; c < fit.cameras.size(); ++c) {
+    const double d = fit.cameras[c].start.time_offset_s;
+    begin = std::min(begin, recording.cameras[c].frames.front().t_s + d - kMargin);
+    end = std::max(end, recording.cameras[c].frames.back().t_s + d + kMargin);
   }
-  const double turn_deg = fit.sigma.head<3>().norm() * 180 / std::numbers::pi;
-  const double shift_mm = 1e3 * fit.sigma.segment<3>(3).norm();
-  const double time_ms = 1e3 * fit.sigma[6];
-  const auto by_size = [&](double value, double fair, double warn, double refused, const std::string& text) {
-    if (value < fair) return;
-    const Verdict verdict = value < warn ? Verdict::kFair : value < refused ? Verdict::kWarn : Verdict::kRefused;
-    q.lower_to(verdict, text);
-  };
-  const std::string more = ": turn the rig faster and about all axes, and record for longer.";
-  by_size(turn_deg, 0.1, 0.3, 1, "The deviation of the rotation is " + to_text(turn_deg, 2) + " deg" + more);
-  by_size(shift_mm, 2, 5, 20, "The deviation of the translation is " + to_text(shift_mm, 2) + " mm" + more);
-  by_size(time_ms, 0.1, 0.5, 5, "The deviation of the offset is " + to_text(time_ms, 2) + " ms" + more);
-  if (fit.start.second_correlation > kAlikePeaks * fit.start.correlation) {
-    q.lower_to(Verdict::kWarn, "The turn rates agree nearly as well at another offset (correlation " +
-                                   to_text(fit.start.second_correlation, 2) + " against " +
-                                   to_text(fit.start.correlation, 2) + "): move less regularly.");
+  begin = std::max(begin, recording.imu.front().t_s);
+  end = std::min(end, recording.imu.back().t_s);
+  const auto before = recording.imu.size();
+  std::erase_if(recording.imu, [&](const ImuRow& row) { return row.t_s < begin || row.t_s > end; });
+  fit.counts.push_back({"imu.skipped.no_pictures", static_cast<std::int64_t>(before - recording.imu.size())});
+  fit.counts.push_back({"imu.used", static_cast<std::int64_t>(recording.imu.size())});
+  for (std::size_t c = 0; c < fit.cameras.size(); ++c) {
+    CameraImuRecording::OfCamera& camera = recording.cameras[c];
+    CameraImuRecording::OfCamera kept;
+    for (std::size_t i = 0; i < camera.frames.size(); ++i) {
+      const double t = camera.frames[i].t_s + fit.cameras[c].start.time_offset_s;
+      if (t < begin + kInside || t > end - kInside) {
+        fit.cameras[c].views[camera.frames[i].view].reason = "no IMU samples at its time";
+        continue;
+      }
+      kept.frames.push_back(std::move(camera.frames[i]));
+      kept.poses.push_back(camera.poses[i]);
+    }
+    camera = std::move(kept);
   }
-  const double noise = std::max(fit.gyroscope_noise_scale, fit.accelerometer_noise_scale);
-  if (noise > kDoubtfulNoise) {
-    q.lower_to(Verdict::kFair, "The IMU is " + to_text(noise, 2) +
-                                   " times as noisy as its densities say: check them and the units, or take a closer "
-                                   "knot spacing if it was shaken.");
+}
+
+void find_starts(const CalibrationTarget& target, const CameraImuOptions& options, CameraImuRecording& recording,
+                 std::span<const CameraRecording> cameras, CameraImuFit& fit) {
+  const calib::MeanRate gyro(recording.imu);
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    calib::unify_numbers(target, gyro, nullptr, recording.cameras[c]);
+    auto found = calib::find_start(recording.cameras[c].poses, recording.imu, options.time_offset_s);
+    if (!found.start) {
+      throw DataError((cameras.size() > 1 ? cameras[c].camera.name + ": " : std::string()) + found.failure);
+    }
+    fit.cameras[c].start = std::move(*found.start);
+    calib::unify_numbers(target, gyro, &fit.cameras[c].start, recording.cameras[c]);
   }
-  const double blocks = (fit.sigma_by_blocks.array() / fit.sigma_by_noise.array()).maxCoeff();
-  if (blocks > kPulledApart) {
-    q.lower_to(Verdict::kFair, "Parts of the recording pull apart " + to_text(blocks, 2) +
-                                   " times more than noise can (blurred pictures, the lens at the image's edge, "
-                                   "coloured residuals of the IMU); the deviations take that into account.");
+}
+
+Vector8d sigma_of_intrinsics(const CameraCalibration& camera) {
+  Vector8d out;
+  const double focal = (camera.intrinsics_px[0] + camera.intrinsics_px[1]) / 2;
+  out << Eigen::Vector4d::Constant(kUsualIntrinsicsSigma * focal), Eigen::Vector4d::Constant(kUsualDistortionSigma);
+  if (!camera.intrinsics_quality) return out;
+  const IntrinsicsQuality& q = *camera.intrinsics_quality;
+  if (q.intrinsics_sigma_px.allFinite()) out.head<4>() = q.intrinsics_sigma_px;
+  if (q.distortion_sigma.allFinite()) out.tail<4>() = q.distortion_sigma;
+  return out;
+}
+
+double camera_period(const std::vector<FrameRow>& frames) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < frames.size(); ++i) steps.push_back(frames[i].t_s - frames[i - 1].t_s);
+  return steps.empty() ? 0 : quantile(steps, 0.5);
+}
+
+// Equations at the solution for all unknowns that there could be.
+calib::SharedEquations equations_of(const CameraImuProblem& problem, const CameraImuState& state,
+                                    const calib::SharedChoice& choice, const CameraImuOptions& options) {
+  calib::SharedEquations out;
+  out.estimated = calib::shared_layout(state.cameras, choice);
+  calib::SharedChoice all = choice;
+  all.intrinsics = true;
+  all.drift = true;
+  all.gravity_size = true;
+  all.line_delay = choice.line_delay || options.check_line_delay;
+  out.all = calib::shared_layout(state.cameras, all);
+  CameraImuProblem wide = problem;
+  if (options.check_line_delay && !choice.line_delay) {
+    const double height = state.cameras.front().camera.height_px;
+    wide.frames() = calib::split_rows(problem.frames(), height / kCheckBands, height / 2);
   }
-  const auto used = static_cast<std::size_t>(std::ranges::count_if(fit.views, &CameraImuView::used));
-  if (2 * used < pictures) {
-    q.lower_to(Verdict::kFair, "Only " + std::to_string(used) + " of " + std::to_string(pictures) +
-                                   " pictures could be used: the reason stands with each.");
+  ChainSystem system(wide.layout(out.all));
+  wide.linearise(state, out.all, system);
+  if (!system.reduce()) throw DataError("the recording does not determine the calibration");
+  out.information = system.shared_information();
+  const int windows = problem.plan().windows;
+  const int groups = std::clamp(windows / kWindowsPerGroup, std::min(windows, kLeastGroups), kMostGroups);
+  std::vector<int> group;
+  for (int w = 0; w < windows; ++w) group.push_back(w * groups / windows);
+  out.pulls = system.shared_pulls(group, groups);
+  return out;
+}
+
+void put_residuals(const CameraImuProblem& problem, const CameraImuState& state, TimeNs origin,
+                   std::span<const CameraRecording> cameras, double loss, CameraImuFit& fit) {
+  fit.imu_residuals = problem.imu_residuals(state);
+  const auto n = static_cast<double>(3 * fit.imu_residuals.cols());
+  fit.gyroscope_chi = std::sqrt(fit.imu_residuals.topRows(3).squaredNorm() / n);
+  fit.accelerometer_chi = std::sqrt(fit.imu_residuals.bottomRows(3).squaredNorm() / n);
+  for (const ImuRow& row : problem.imu()) {
+    fit.imu_time_ns.push_back(origin + from_seconds(row.t_s));
+    fit.T_target_imu.push_back(problem.pose_at(state, row.t_s));
+  }
+  fit.biases = state.biases;
+  for (int i = 0; i < problem.plan().bias_knots(); ++i) {
+    fit.bias_time_ns.push_back(origin +
+                               from_seconds(problem.plan().grid.start_s + i * problem.plan().bias_spacing_s()));
+  }
+  std::vector<double> chi_sum(cameras.size(), 0.0);
+  std::vector<double> chi_count(cameras.size(), 0.0);
+  const auto corners = problem.corner_residuals(state);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const FrameRow& frame = problem.frames()[i];
+    CameraImuCamera& camera = fit.cameras[frame.camera];
+    camera.views[frame.view].used = true;
+    camera.views[frame.view].sigma_px = frame.sigma_px;
+    for (std::size_t k = 0; k < frame.corners.size(); ++k) {
+      const Eigen::Vector2d residual = -corners[i].col(static_cast<Eigen::Index>(k));
+      const double s = residual.squaredNorm() / (frame.sigma_px * frame.sigma_px);
+      camera.corners.push_back({static_cast<std::int32_t>(frame.view), frame.corners[k].id, frame.corners[k].pixel,
+                                residual, std::isfinite(s) ? 1 / (1 + s / (loss * loss)) : 0});
+      if (!std::isfinite(s)) continue;
+      chi_sum[frame.camera] += s;
+      chi_count[frame.camera] += 2;
+    }
+  }
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    CameraImuCamera& camera = fit.cameras[c];
+    camera.corner_chi = std::sqrt(chi_sum[c] / std::max(1.0, chi_count[c]));
+    std::vector<double> squares(camera.views.size(), 0.0);
+    std::vector<double> counts(camera.views.size(), 0.0);
+    for (const CameraImuCorner& corner : camera.corners) {
+      if (!corner.residual_px.allFinite()) continue;
+      squares[static_cast<std::size_t>(corner.view)] += corner.residual_px.squaredNorm();
+      counts[static_cast<std::size_t>(corner.view)] += 1;
+    }
+    for (std::size_t v = 0; v < squares.size(); ++v) {
+      if (counts[v] > 0) camera.views[v].rms_px = std::sqrt(squares[v] / counts[v]);
+    }
   }
 }
 
@@ -312,91 +427,82 @@ void CameraImuOptions::check() const {
   require_not_negative("time_limit_s", time_limit_s);
 }
 
-CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<const TargetView> views,
-                                  const CameraCalibration& camera, std::span<const ImuMeasurement> imu,
-                                  const ImuNoise& noise, const CameraImuOptions& options) {
+CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<const CameraRecording> cameras,
+                                  std::span<const ImuMeasurement> imu, const ImuNoise& noise,
+                                  const CameraImuOptions& options) {
   options.check();
   target.check();
+  require(!cameras.empty(), "cameras", 0, "must be at least one");
+  for (const CameraRecording& camera : cameras) camera.camera.check();
   CameraImuFit fit;
   const double begin_cpu = cpu_s();
-  Recording recording = read(target, views, camera, imu, options, fit);
-  auto found = calib::find_start(recording.poses, recording.imu, options.time_offset_s);
-  if (!found.start) throw DataError(found.failure);
-  fit.start = *found.start;
-  // What both have seen, and a little more of the IMU.
-  const double d = fit.start.time_offset_s;
-  const double begin = std::max(recording.imu.front().t_s, recording.frames.front().t_s + d - kMargin);
-  const double end = std::min(recording.imu.back().t_s, recording.frames.back().t_s + d + kMargin);
-  std::erase_if(recording.imu, [&](const ImuRow& row) { return row.t_s < begin || row.t_s > end; });
-  std::vector<FrameRow> frames;
-  std::vector<CameraPoseSample> poses;
-  std::vector<std::size_t> view_of;
-  for (std::size_t i = 0; i < recording.frames.size(); ++i) {
-    const double t = recording.frames[i].t_s + d;
-    if (t < begin + kInside || t > end - kInside) {
-      fit.views[recording.view_of[i]].reason = "no IMU samples at its time";
-      continue;
-    }
-    frames.push_back(std::move(recording.frames[i]));
-    poses.push_back(recording.poses[i]);
-    view_of.push_back(recording.view_of[i]);
-  }
-  recording.poses = poses;
-  const double dt =
-      (recording.imu.back().t_s - recording.imu.front().t_s) / static_cast<double>(recording.imu.size() - 1);
-  const double spacing = options.knot_spacing_s > 0 ? options.knot_spacing_s : 4 * dt;
-  const calib::ChainPlan plan = calib::plan_chain(begin, end, spacing, options.order, options.bias_spacing_s);
+  CameraImuRecording recording = calib::read_recording(target, cameras, imu, options.corner_sigma_px, fit);
+  find_starts(target, options, recording, cameras, fit);
+  keep_common(recording, fit);
+  const double begin = recording.imu.front().t_s;
+  const double end = recording.imu.back().t_s;
+  const double dt = (end - begin) / static_cast<double>(recording.imu.size() - 1);
+  const calib::KnotChoice knots = calib::choose_knots(recording.imu, options.order, options.knot_spacing_s,
+                                                      camera_period(recording.cameras.front().frames));
+  const calib::ChainPlan plan = calib::plan_chain(begin, end, knots.spacing_s, options.order, options.bias_spacing_s);
   fit.knot_spacing_s = plan.grid.spacing_s;
+  fit.knot_reason = knots.reason;
+  fit.bandwidth_hz = knots.bandwidth_hz;
   const DiscreteImuNoise sample = discretise(noise, dt);
   const DiscreteImuNoise knot = discretise(noise, plan.bias_spacing_s());
-  CameraImuState state = first_state(recording, plan, fit.start, options.gravity);
-  fit.start.gravity_target = state.gravity;
-  CameraImuProblem problem(Camera(camera), recording.imu, frames,
+  CameraImuState state = first_state(recording, plan, cameras, fit, options);
+  std::vector<FrameRow> frames;
+  std::vector<Vector8d> intrinsics_sigma;
+  std::vector<calib::IntrinsicsPrior> priors;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    const CameraCalibration& camera = cameras[c].camera;
+    std::vector<FrameRow> own = std::move(recording.cameras[c].frames);
+    if (options.estimate_line_delay) own = calib::split_rows(own, kLineBand, 0.5 * camera.height_px);
+    frames.insert(frames.end(), std::make_move_iterator(own.begin()), std::make_move_iterator(own.end()));
+    intrinsics_sigma.push_back(sigma_of_intrinsics(camera));
+    // Where nobody measured them, what they are taken to be is no measurement either.
+    const bool known = camera.intrinsics_quality && camera.intrinsics_quality->intrinsics_sigma_px.allFinite();
+    priors.push_back(
+        {calib::parameters_of(camera), known ? Vector8d(intrinsics_sigma.back().cwiseMax(kLeastPriorSigma))
+                                             : Vector8d(Vector8d::Constant(std::numeric_limits<double>::infinity()))});
+  }
+  CameraImuProblem problem(recording.imu, std::move(frames),
                            {sample.sigma_angular_velocity, sample.sigma_specific_force, knot.sigma_gyroscope_bias_step,
                             knot.sigma_accelerometer_bias_step},
                            options.loss_sigmas, plan);
+  if (options.refine_intrinsics) problem.priors() = std::move(priors);
   fit.start_cpu_s = cpu_s() - begin_cpu;
 
   const double solve_begin = cpu_s();
-  Solver solver(problem, options, fit);
-  double cost = solver.run(state);
+  const calib::SharedChoice choice{options.refine_intrinsics, options.estimate_line_delay, options.estimate_drift,
+                                   options.estimate_gravity, options.estimate_imu_matrices};
+  const SharedLayout shared = calib::shared_layout(state.cameras, choice);
+  Solver solver(problem, shared, options, fit);
+  fit.cost = solver.run(state);
   if (options.adapt_noise) {
     for (int round = 0; round < kNoiseRounds && fit.stopped.empty(); ++round) {
       adapt_noise(problem, state, dt, fit);
-      cost = solver.run(state);
+      fit.cost = solver.run(state);
     }
   }
-  ChainSystem& system = solver.system();
-  ChainStep step;
-  if (!system.solve(0, step)) throw DataError("the recording does not determine the calibration");
-  fit.covariance = system.shared_covariance().topLeftCorner<7, 7>();
-  fit.sigma_by_noise = fit.covariance.diagonal().cwiseSqrt();
-  const int groups = std::clamp(plan.windows / 3, 1, 24);
-  std::vector<int> group;
-  for (int w = 0; w < plan.windows; ++w) group.push_back(w * groups / plan.windows);
-  const Eigen::MatrixXd pulls = system.shared_covariance() * system.shared_pulls(group, groups);
-  fit.sigma_by_blocks = pulls.topRows<7>().rowwise().norm() * std::sqrt(groups / std::max(1.0, groups - 1.0));
-  fit.sigma = fit.sigma_by_noise.cwiseMax(fit.sigma_by_blocks);
-  fit.cost = cost;
-  fit.T_camera_imu = {state.R_camera_imu, state.t_camera_imu};
-  fit.time_offset_s = state.offset_s;
-  fit.gravity_target = state.gravity;
-  const Eigen::MatrixXd residuals = problem.imu_residuals(state);
-  fit.gyroscope_chi = std::sqrt(residuals.topRows(3).squaredNorm() / static_cast<double>(3 * residuals.cols()));
-  fit.accelerometer_chi = std::sqrt(residuals.bottomRows(3).squaredNorm() / static_cast<double>(3 * residuals.cols()));
-  const auto corners = problem.corner_residuals(state);
-  double sum = 0;
-  double count = 0;
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    CameraImuView& view = fit.views[view_of[i]];
-    view.used = true;
-    view.rms_px = std::sqrt(corners[i].squaredNorm() / static_cast<double>(corners[i].cols()));
-    view.sigma_px = problem.frames()[i].sigma_px;
-    sum += corners[i].squaredNorm() / (view.sigma_px * view.sigma_px);
-    count += static_cast<double>(corners[i].size());
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    const calib::CameraState& found = state.cameras[c];
+    CameraImuCamera& camera = fit.cameras[c];
+    camera.T_camera_imu = {found.R_camera_imu, found.t_camera_imu};
+    camera.time_offset_s = found.offset_s;
+    camera.camera = found.camera;
+    camera.camera.T_body_camera = camera.T_camera_imu.inverse();
+    camera.camera.time_offset_s = found.offset_s;
+    if (options.refine_intrinsics) {
+      camera.intrinsics_change = calib::parameters_of(found.camera) - calib::parameters_of(cameras[c].camera);
+    }
   }
-  fit.corner_chi = std::sqrt(sum / count);
-  judge(fit, views.size());
+  fit.gravity_target = state.gravity;
+  fit.gyroscope_matrix = state.gyro_matrix;
+  fit.accelerometer_matrix = state.accel_matrix;
+  calib::put_deviations(equations_of(problem, state, choice, options), state, intrinsics_sigma, fit);
+  put_residuals(problem, state, recording.origin, cameras, options.loss_sigmas, fit);
+  calib::judge(options, knots.too_fast, end - begin, fit);
   fit.solve_cpu_s = cpu_s() - solve_begin;
   return fit;
 }

@@ -27,6 +27,7 @@
 #include <string>
 #include <vector>
 
+#include "libloc/core/named_count.hpp"
 #include "libloc/core/quality.hpp"
 #include "libloc/core/time.hpp"
 #include "libloc/geometry/pose3.hpp"
@@ -37,34 +38,63 @@
 
 namespace loc {
 
-/// Start values, from the recording alone.
+/// How the IMU's attitude is written as a spline. Both give the same calibration.
+enum class RotationForm : std::uint8_t {
+  kCumulative,   ///< calib/spline: no attitude is special
+  kThreeAngles,  ///< calib/euler_trajectory, with the mean attitude taken out: the source's, for motion about one
+                 ///< attitude
+};
+
+/// What one camera of the rig has seen.
+struct CameraRecording {
+  CameraCalibration camera;       ///< intrinsics, with their deviations when it has them; its pose plays no part
+  std::vector<TargetView> views;  ///< pictures with their times on the camera's clock
+};
+
+/// Correlation of the turn rates at every offset that was tried.
+struct OffsetCurve {
+  std::vector<double> offset_s;
+  std::vector<double> correlation;
+};
+
+/// Start values of a camera, from the recording alone.
 struct CameraImuStart {
   double time_offset_s = 0;  ///< t_imu = t_camera + d
   Eigen::Quaterniond R_camera_imu = Eigen::Quaterniond::Identity();
   Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();  ///< [rad/s]
-  Eigen::Vector3d gravity_target = Eigen::Vector3d::Zero();  ///< in target [m/s^2]
   double correlation = 0;                                    ///< of the turn rates, at the offset
   double second_correlation = 0;                             ///< the best elsewhere
+  double rate_ratio = 1;                                 ///< size of the gyroscope's rates over that of the camera's
   Eigen::Vector3d excitation = Eigen::Vector3d::Zero();  ///< deviations of the turn rate along its main axes [rad/s]
+  OffsetCurve curve;
 };
 
 /// Where the solution stands.
 struct CameraImuProgress {
   int iteration = 0;
   double cost = 0;
-  double time_offset_s = 0;
+  double time_offset_s = 0;  ///< of the first camera
   double elapsed_s = 0;
 };
 
 struct CameraImuOptions {
-  int order = 6;              ///< of the pose's spline, 4 or 6 are usual
-  double knot_spacing_s = 0;  ///< 0: from the IMU's rate, four samples
-  double bias_spacing_s = 1;  ///< biases run straight between knots so far apart
-  double corner_sigma_px = 0.3;
-  double loss_sigmas = 3;    ///< Cauchy's: a corner so far off counts half
-  double gravity = 9.80665;  ///< [m/s^2]
-  bool adapt_noise = true;   ///< noise of both IMU sensors and of each picture from the residuals, then once more
+  int order = 6;  ///< of the pose's spline, 4 or 6 are usual
+  RotationForm rotation = RotationForm::kCumulative;
+  double knot_spacing_s = 0;     ///< 0: from the IMU's spectrum
+  double bias_spacing_s = 1;     ///< biases run straight between knots so far apart
+  double corner_sigma_px = 0.3;  ///< of a coordinate
+  double loss_sigmas = 3;        ///< Cauchy's: a corner so far off counts half
+  double gravity = 9.80665;      ///< [m/s^2]
+  bool adapt_noise = true;       ///< noise of both IMU sensors and of each picture from the residuals, then once more
   std::optional<double> time_offset_s{};  ///< known to half a second; otherwise all offsets are tried
+  /// More unknowns. @{
+  bool refine_intrinsics = false;    ///< focal lengths, principal point, distortion of every camera
+  bool estimate_line_delay = false;  ///< rolling shutter: time from one row to the next
+  bool estimate_drift = false;       ///< the offset changes evenly over the recording
+  bool estimate_gravity = false;  ///< its size too: for a target whose size is certain, an accelerometer whose scale is
+  bool estimate_imu_matrices = false;  ///< scale and misalignment of gyroscope and accelerometer
+  /// @}
+  bool check_line_delay = true;  ///< where it is not estimated: would it be something else than 0?
   int max_iterations = 50;
   double time_limit_s = 0;  ///< 0: none
   std::function<bool(const CameraImuProgress&)>
@@ -82,24 +112,76 @@ struct CameraImuView {
   double sigma_px = kUnknown;  ///< that its corners were given
 };
 
-struct CameraImuFit {
+/// A corner of a picture that was used.
+struct CameraImuCorner {
+  std::int32_t view = 0;
+  std::int32_t id = 0;
+  Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
+  Eigen::Vector2d residual_px = Eigen::Vector2d::Zero();  ///< found less projected
+  double weight = 1;                                      ///< that the loss leaves it
+};
+
+/// A quantity, estimated, or (where it was held) one step from there with everything else free. NaN: not looked at.
+struct CameraImuCheck {
+  double value = kUnknown;
+  double sigma = kUnknown;
+  bool estimated = false;
+};
+
+using Vector8d = Eigen::Matrix<double, 8, 1>;
+using Vector7d = Eigen::Matrix<double, 7, 1>;
+using Matrix7d = Eigen::Matrix<double, 7, 7>;
+
+/// Of one camera.
+struct CameraImuCamera {
   Pose3 T_camera_imu;
-  double time_offset_s = 0;                                  ///< t_imu = t_camera + d
-  Eigen::Vector3d gravity_target = Eigen::Vector3d::Zero();  ///< [m/s^2]
+  double time_offset_s = 0;  ///< t_imu = t_camera + d; with a drift, in the middle of the recording
   /// Of a small turn of the camera about the IMU's axes [rad] (R_camera_imu Exp(turn)), of the translation of
   /// T_camera_imu [m], of the offset [s].
-  Eigen::Matrix<double, 7, 7> covariance = Eigen::Matrix<double, 7, 7>::Zero();
-  Eigen::Matrix<double, 7, 1> sigma = Eigen::Matrix<double, 7, 1>::Zero();            ///< the larger of both
-  Eigen::Matrix<double, 7, 1> sigma_by_noise = Eigen::Matrix<double, 7, 1>::Zero();   ///< from the noise as given
-  Eigen::Matrix<double, 7, 1> sigma_by_blocks = Eigen::Matrix<double, 7, 1>::Zero();  ///< from how pieces pull
+  Matrix7d covariance = Matrix7d::Zero();           ///< its deviations are sigma
+  Vector7d sigma = Vector7d::Zero();                ///< of all that follow
+  Vector7d sigma_by_noise = Vector7d::Zero();       ///< from the noise as given or adapted
+  Vector7d sigma_by_blocks = Vector7d::Zero();      ///< from how pieces of the recording pull
+  Vector7d sigma_by_intrinsics = Vector7d::Zero();  ///< from the deviations of the camera's intrinsics
+  CameraCalibration camera;                         ///< as given, with pose and offset; intrinsics when refined
+  Vector8d intrinsics_sigma =
+      Vector8d::Zero();  ///< that were taken for fx fy cx cy and the distortion; when refined: found
+  Vector8d intrinsics_change = Vector8d::Zero();  ///< that the recording would make, or has made when refined
+  /// How the mounting (as in covariance) moves with fx fy cx cy and the distortion that are held.
+  Eigen::Matrix<double, 7, 8> by_intrinsics = Eigen::Matrix<double, 7, 8>::Zero();
+  CameraImuCheck line_delay_s;  ///< from one row to the next
+  CameraImuCheck offset_drift;  ///< [s/s]
   CameraImuStart start;
   std::vector<CameraImuView> views;
+  std::vector<CameraImuCorner> corners;
+  double corner_chi = 0;  ///< root of the mean square of the residuals over their deviation: 1 is right
+};
+
+struct CameraImuFit {
+  std::vector<CameraImuCamera> cameras;                      ///< one for each that was given
+  Eigen::Vector3d gravity_target = Eigen::Vector3d::Zero();  ///< [m/s^2]
+  double gravity_direction_sigma = 0;                        ///< [rad]
+  CameraImuCheck gravity_size;                               ///< [m/s^2]
+  /// reading = matrix * what the sensor feels + bias; of the gyroscope all entries, of the accelerometer a lower
+  /// triangle (body is the frame in which it is one). @{
+  Eigen::Matrix3d gyroscope_matrix = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d gyroscope_matrix_sigma = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d accelerometer_matrix = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d accelerometer_matrix_sigma = Eigen::Matrix3d::Zero();
+  /// @}
+  std::vector<TimeNs> bias_time_ns;
+  Eigen::MatrixXd biases;  ///< (6, n) gyroscope [rad/s] above accelerometer [m/s^2], straight between the times
+  std::vector<TimeNs> imu_time_ns;
+  Eigen::MatrixXd imu_residuals;    ///< (6, n) felt less read, over their deviations
+  std::vector<Pose3> T_target_imu;  ///< at imu_time_ns
   double knot_spacing_s = 0;
+  double bandwidth_hz = 0;   ///< below which the IMU's spectrum holds the motion
+  std::string knot_reason;   ///< why this spacing
   double gyroscope_chi = 0;  ///< root of the mean square of the residuals over their deviation: 1 is right
   double accelerometer_chi = 0;
-  double corner_chi = 0;
   double gyroscope_noise_scale = 1;  ///< on the noise that was given, when it was adapted
   double accelerometer_noise_scale = 1;
+  NamedCounts counts;  ///< {"imu.used", n}, {"imu.skipped.not_finite", n}, …
   double cost = 0;
   int iterations = 0;
   bool converged = false;
@@ -109,12 +191,12 @@ struct CameraImuFit {
   Quality quality;
 };
 
-/// @param views pictures with their times on the camera's clock  @param camera intrinsics; its pose plays no part
-/// @param imu calibrated samples, in order of time  @param noise densities of the IMU
-/// @throws std::invalid_argument for options, the target and the camera; DataError for what cannot be calibrated, with
+/// @param imu calibrated samples; those that are not finite or not later than the one before are skipped and counted
+/// @param noise densities of the IMU
+/// @throws std::invalid_argument for options, the target and the cameras; DataError for what cannot be calibrated, with
 /// the reason: no common motion, one axis only, too few pictures.
-CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<const TargetView> views,
-                                  const CameraCalibration& camera, std::span<const ImuMeasurement> imu,
-                                  const ImuNoise& noise, const CameraImuOptions& options = {});
+CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<const CameraRecording> cameras,
+                                  std::span<const ImuMeasurement> imu, const ImuNoise& noise,
+                                  const CameraImuOptions& options = {});
 
 }  // namespace loc

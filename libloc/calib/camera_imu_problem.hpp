@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,12 +18,19 @@ namespace loc::calib {
 struct FrameCorner {
   Eigen::Vector3d point;  // in target
   Eigen::Vector2d pixel;
+  std::int32_t id = 0;
 };
+/// A picture, or a band of its rows when the rows have times of their own.
 struct FrameRow {
-  double t_s = 0;  // of the camera's clock, on the common origin
+  std::size_t camera = 0;
+  std::size_t view = 0;  // of the camera's recording
+  double t_s = 0;        // of the camera's clock, on the common origin
+  double lines = 0;      // rows from the middle of the image to that of the band
   double sigma_px = 0;
   std::vector<FrameCorner> corners;
 };
+/// Each picture as bands of so many rows, with the mean row of the corners as theirs.
+std::vector<FrameRow> split_rows(const std::vector<FrameRow>& frames, double band_px, double middle_px);
 
 /// Deviations of one reading each, and of a bias's step from one knot to the next.
 struct CameraImuSigmas {
@@ -45,18 +53,67 @@ struct ChainPlan {
 /// A grid whose end is the end of its last window: the spacing is what comes next to the one that was asked for.
 ChainPlan plan_chain(double begin_s, double end_s, double spacing_s, int order, double bias_spacing_s);
 
-struct CameraImuState {
-  std::vector<Eigen::Quaterniond> rotations;  // control points
-  Eigen::MatrixXd positions;                  // likewise, 3 x n
-  Eigen::MatrixXd biases;                     // gyroscope above accelerometer, 6 x bias knots
+struct CameraState {
   Eigen::Quaterniond R_camera_imu = Eigen::Quaterniond::Identity();
   Eigen::Vector3d t_camera_imu = Eigen::Vector3d::Zero();
   double offset_s = 0;
-  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  // in target
+  double drift = 0;     // of the offset [s/s]
+  double middle_s = 0;  // time of the camera at which the drift adds nothing
+  double line_delay_s = 0;
+  CameraCalibration camera;  // its intrinsics
 };
 
-/// The shared unknowns: rotation of the camera (on the right), its translation, offset, direction of gravity.
-enum Shared : int { kTurn = 0, kShift = 3, kOffset = 6, kGravity = 7, kSharedSize = 9 };
+struct CameraImuState {
+  RotationForm form = RotationForm::kCumulative;
+  std::vector<Eigen::Quaterniond> rotations;  // control points of the cumulative form
+  Eigen::Quaterniond mean = Eigen::Quaterniond::Identity();
+  Eigen::MatrixXd angles;     // control points of the three angles, 3 x n
+  Eigen::MatrixXd positions;  // control points, 3 x n
+  Eigen::MatrixXd biases;     // gyroscope above accelerometer, 6 x bias knots
+  std::vector<CameraState> cameras;
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  // in target
+  Eigen::Matrix3d gyro_matrix = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d accel_matrix = Eigen::Matrix3d::Identity();  // lower triangle
+
+  double time_of(const FrameRow& frame) const {
+    const CameraState& c = cameras[frame.camera];
+    return frame.t_s + c.offset_s + c.drift * (frame.t_s - c.middle_s) + c.line_delay_s * frame.lines;
+  }
+};
+
+/// What is unknown besides the mounting of each camera and the direction of gravity.
+struct SharedChoice {
+  bool intrinsics = false;
+  bool line_delay = false;
+  bool drift = false;
+  bool gravity_size = false;
+  bool imu_matrices = false;
+};
+
+/// The first seven of a camera: rotation of the camera (on the right), its translation, offset.
+enum Mounting : int { kTurn = 0, kShift = 3, kOffset = 6, kMountingSize = 7 };
+
+/// Where the shared unknowns are; -1: there is none of that kind. Those of a camera lie together, and those that the
+/// IMU's readings depend on.
+struct SharedLayout {
+  struct OfCamera {
+    int first = 0;  // Mounting
+    int drift = -1;
+    int line_delay = -1;
+    int intrinsics = -1;
+    int intrinsics_size = 0;
+    int size = 0;
+  };
+  std::vector<OfCamera> cameras;
+  int gravity = 0;  // direction, two
+  int gravity_size = -1;
+  int gyro_matrix = -1;   // nine, row by row
+  int accel_matrix = -1;  // six, lower triangle row by row
+  int size = 0;
+
+  int imu_size() const { return size - gravity; }
+};
+SharedLayout shared_layout(std::span<const CameraState> cameras, const SharedChoice& choice);
 
 /// Two directions across gravity.
 Eigen::Matrix<double, 3, 2> across(const Eigen::Vector3d& gravity);
@@ -67,12 +124,19 @@ struct CameraImuCost {
   double corner = 0;
   double bias = 0;
   double smoothing = 0;
-  double total() const { return gyro + accel + corner + bias + smoothing; }
+  double prior = 0;
+  double total() const { return gyro + accel + corner + bias + smoothing + prior; }
+};
+
+/// What is known of a camera's intrinsics before.
+struct IntrinsicsPrior {
+  Vector8d mean;
+  Vector8d sigma;  // infinite: nothing
 };
 
 class CameraImuProblem {
  public:
-  CameraImuProblem(Camera camera, std::vector<ImuRow> imu, std::vector<FrameRow> frames, const CameraImuSigmas& sigmas,
+  CameraImuProblem(std::vector<ImuRow> imu, std::vector<FrameRow> frames, const CameraImuSigmas& sigmas,
                    double loss_sigmas, const ChainPlan& plan);
 
   const ChainPlan& plan() const { return plan_; }
@@ -80,36 +144,49 @@ class CameraImuProblem {
   std::vector<FrameRow>& frames() { return frames_; }
   const std::vector<FrameRow>& frames() const { return frames_; }
   CameraImuSigmas& sigmas() { return sigmas_; }
-  ChainLayout layout() const;
+  /// Of each camera; none: no prior.
+  std::vector<IntrinsicsPrior>& priors() { return priors_; }
+  ChainLayout layout(const SharedLayout& shared) const;
 
-  /// Cost, and with a system also normal equations.
-  CameraImuCost evaluate(const CameraImuState& state, ChainSystem* system) const;
-  CameraImuState stepped(const CameraImuState& state, const ChainStep& step) const;
+  CameraImuCost cost(const CameraImuState& state) const { return evaluate(state, nullptr, nullptr); }
+  /// Cost and normal equations.
+  CameraImuCost linearise(const CameraImuState& state, const SharedLayout& shared, ChainSystem& system) const {
+    return evaluate(state, &shared, &system);
+  }
+  CameraImuState stepped(const CameraImuState& state, const SharedLayout& shared, const ChainStep& step) const;
 
-  /// Residuals over their deviations. @{
-  Eigen::MatrixXd imu_residuals(const CameraImuState& state) const;                  // 6 x samples
-  std::vector<Eigen::MatrixXd> corner_residuals(const CameraImuState& state) const;  // 2 x corners, in pixels
-                                                                                     /// @}
+  /// Attitude and place at a time of the IMU's clock.
+  Pose3 pose_at(const CameraImuState& state, double t_s) const;
+  /// Predicted less read, over their deviations: 6 x samples.
+  Eigen::MatrixXd imu_residuals(const CameraImuState& state) const;
+  /// Predicted less found, of each frame: 2 x corners, in pixels; NaN where there is no projection.
+  std::vector<Eigen::MatrixXd> corner_residuals(const CameraImuState& state) const;
 
  private:
   struct Scratch;
-  void add_imu(const CameraImuState& state, int segment, Scratch& scratch, ChainSystem* system,
-               CameraImuCost& cost) const;
-  void add_frame(const CameraImuState& state, const FrameRow& frame, Scratch& scratch, ChainSystem* system,
-                 CameraImuCost& cost) const;
+  Scratch scratch_of(const CameraImuState& state) const;
+  CameraImuCost evaluate(const CameraImuState& state, const SharedLayout* shared, ChainSystem* system) const;
+  RotationState rotation_of(const CameraImuState& state, const Scratch& scratch, int segment,
+                            const SplineWeights& weights, const SplineWeights& cumulative, RotationJacobians* by) const;
+  void add_imu(const CameraImuState& state, int segment, const SharedLayout* shared, Scratch& scratch,
+               ChainSystem* system, CameraImuCost& cost) const;
+  void add_frame(const CameraImuState& state, const FrameRow& frame, const SharedLayout* shared, Scratch& scratch,
+                 ChainSystem* system, CameraImuCost& cost) const;
   void add_smoothing(const CameraImuState& state, int segment, Scratch& scratch, ChainSystem* system,
                      CameraImuCost& cost) const;
   void add_biases(const CameraImuState& state, ChainSystem* system, CameraImuCost& cost) const;
+  void add_priors(const CameraImuState& state, const SharedLayout* shared, ChainSystem* system,
+                  CameraImuCost& cost) const;
   int window_of(int segment) const;
   int control_place(int window, int control) const;
   int bias_place(int window, int knot) const;
 
-  Camera camera_;
   std::vector<ImuRow> imu_;
   std::vector<FrameRow> frames_;
   CameraImuSigmas sigmas_;
   double loss_;
   ChainPlan plan_;
+  std::vector<IntrinsicsPrior> priors_;
   std::vector<std::size_t> first_imu_;  // of each segment; one more
   std::vector<SplineWeights> imu_weights_;
   std::vector<SplineWeights> imu_cumulative_;

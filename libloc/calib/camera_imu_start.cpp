@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "libloc/calib/least_squares.hpp"
 #include "libloc/core/check.hpp"
@@ -27,7 +28,9 @@ constexpr double kSecondApart = 0.3;      // [s] from the peak, to count as anot
 constexpr double kLeastOverlap = 0.5;     // of the pictures, or of what the shorter recording allows
 constexpr std::size_t kLeastSteps = 20;
 constexpr double kLeastExcitation = 0.02;  // [rad/s] along the second axis
+constexpr double kOtherUnit = 3;           // ratio of the turn rates that no mounting and no scale explains
 constexpr int kRobustRounds = 3;
+constexpr double kTurnStep = 0.01;  // [s] in which the mean rate is enough
 
 // A turn of the camera between two pictures.
 struct Turn {
@@ -77,6 +80,7 @@ struct Peak {
   double offset_s = 0;
   double correlation = -1;
   double second = -1;
+  OffsetCurve curve;
 };
 
 // Norms of the turn rates know nothing of the rotation between the sensors; all offsets are tried at which half of the
@@ -94,7 +98,7 @@ Peak correlate(const std::vector<Turn>& turns, const MeanRate& gyro, double low_
   const double seen = turns.back().to_s - turns.front().from_s;
   const double possible = std::min(1.0, (gyro.end_s() - gyro.begin_s()) / seen);
   const double needed = std::max<double>(kLeastSteps, kLeastOverlap * possible * static_cast<double>(turns.size()));
-  std::vector<std::pair<double, double>> found;  // offset and correlation
+  Peak peak;
   for (double d = low_s; d <= high_s; d += h) {
     PairSums sums;
     for (const Turn& turn : turns) {
@@ -102,17 +106,18 @@ Peak correlate(const std::vector<Turn>& turns, const MeanRate& gyro, double low_
       if (at < -0.5 || at > static_cast<double>(norms.size()) - 0.5) continue;
       sums.add(turn.rate.norm(), norms[static_cast<std::size_t>(std::lround(std::max(at, 0.0)))]);
     }
-    if (sums.n >= needed) found.emplace_back(d, sums.correlation());
-  }
-  Peak peak;
-  for (const auto& [d, c] : found) {
-    if (c > peak.correlation) {
-      peak.correlation = c;
+    if (sums.n < needed) continue;
+    peak.curve.offset_s.push_back(d);
+    peak.curve.correlation.push_back(sums.correlation());
+    if (peak.curve.correlation.back() > peak.correlation) {
+      peak.correlation = peak.curve.correlation.back();
       peak.offset_s = d;
     }
   }
-  for (const auto& [d, c] : found) {
-    if (std::abs(d - peak.offset_s) > kSecondApart) peak.second = std::max(peak.second, c);
+  for (std::size_t i = 0; i < peak.curve.offset_s.size(); ++i) {
+    if (std::abs(peak.curve.offset_s[i] - peak.offset_s) > kSecondApart) {
+      peak.second = std::max(peak.second, peak.curve.correlation[i]);
+    }
   }
   return peak;
 }
@@ -122,6 +127,7 @@ struct Wahba {
   Eigen::Quaterniond R_camera_imu = Eigen::Quaterniond::Identity();
   Vector3d bias = Vector3d::Zero();
   double cost = 0;                     // mean square of the residuals, weighted
+  double camera_square = 0;            // mean square of the camera's rates about their mean
   Matrix3d spread = Matrix3d::Zero();  // of the gyroscope's rates
 };
 
@@ -151,14 +157,17 @@ Wahba solve_wahba(const std::vector<Turn>& turns, const MeanRate& gyro, double o
     x_mean /= sum;
     y_mean /= sum;
     Matrix3d correlation = Matrix3d::Zero();
+    out.camera_square = 0;
     out.spread.setZero();
     for (std::size_t i = 0; i < n; ++i) {
       if (!covered[i]) continue;
       const Vector3d y = rates[i] - y_mean;
       correlation += weights[i] * (turns[i].rate - x_mean) * y.transpose();
       out.spread += weights[i] * y * y.transpose();
+      out.camera_square += weights[i] * (turns[i].rate - x_mean).squaredNorm();
     }
     out.spread /= sum;
+    out.camera_square /= sum;
     const Eigen::JacobiSVD<Matrix3d> svd(correlation, Eigen::ComputeFullU | Eigen::ComputeFullV);
     Matrix3d fix = Matrix3d::Identity();
     fix(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
@@ -209,6 +218,18 @@ Vector3d MeanRate::between(double from_s, double to_s) const {
   return (integral(to_s) - integral(from_s)) / (to_s - from_s);
 }
 
+Eigen::Quaterniond turn_between(const MeanRate& gyro, const Vector3d& bias, double from_s, double to_s) {
+  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+  const int steps = static_cast<int>(std::ceil(std::abs(to_s - from_s) / kTurnStep));
+  const double h = steps > 0 ? (to_s - from_s) / steps : 0;
+  for (int s = 0; s < steps; ++s) {
+    const double a = from_s + s * h;
+    const Vector3d rate = h > 0 ? gyro.between(a, a + h) : gyro.between(a + h, a);
+    turn = so3::boxplus(turn, (rate - bias) * h);
+  }
+  return turn;
+}
+
 StartResult find_start(std::span<const CameraPoseSample> poses, std::span<const ImuRow> imu,
                        std::optional<double> given_offset_s) {
   const std::vector<Turn> turns = turns_of(poses);
@@ -228,6 +249,7 @@ StartResult find_start(std::span<const CameraPoseSample> poses, std::span<const 
   CameraImuStart out;
   out.correlation = peak.correlation;
   out.second_correlation = peak.second;
+  out.curve = peak.curve;
   if (peak.correlation < kLeastCorrelation) {
     return {{},
             "Camera and gyroscope do not turn alike at any offset of their clocks (correlation " +
@@ -243,6 +265,13 @@ StartResult find_start(std::span<const CameraPoseSample> poses, std::span<const 
   wahba = solve_wahba(turns, gyro, out.time_offset_s, weights, true);
   out.R_camera_imu = wahba.R_camera_imu;
   out.gyroscope_bias = wahba.bias;
+  out.rate_ratio = std::sqrt(wahba.spread.trace() / std::max(wahba.camera_square, 1e-300));
+  if (out.rate_ratio > kOtherUnit || out.rate_ratio < 1 / kOtherUnit) {
+    return {{},
+            "The gyroscope turns " + to_text(out.rate_ratio, 3) +
+                " times as fast as the camera: its unit is not rad/s" +
+                (std::abs(out.rate_ratio * std::numbers::pi / 180 - 1) < 0.2 ? " but deg/s." : ".")};
+  }
   const double unexplained = wahba.cost / wahba.spread.trace();
   if (!(unexplained < kMostUnexplained)) {
     return {

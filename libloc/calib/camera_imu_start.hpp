@@ -37,6 +37,9 @@ class MeanRate {
   std::vector<Eigen::Vector3d> rates_;
 };
 
+/// Turn of the body from one time to the other, in its axes at the first: R(to) = R(from) turn.
+Eigen::Quaterniond turn_between(const MeanRate& gyro, const Eigen::Vector3d& bias, double from_s, double to_s);
+
 struct StartResult {
   std::optional<CameraImuStart> start;
   std::string failure;  ///< a sentence, when there is none

@@ -99,8 +99,13 @@ bool ChainSystem::eliminate_nodes() {
     border.noalias() -= C.bottomRows(m) * C.topRows(k).transpose();
     shared.noalias() -= C.bottomRows(m) * C.bottomRows(m).transpose();
   }
-  shared_factor_ = shared;
-  return m == 0 || blas::cholesky_lower(size_of(m), shared_factor_.data(), size_of(m));
+  shared_ = shared.selfadjointView<Eigen::Lower>();
+  return true;
+}
+
+bool ChainSystem::reduce() {
+  eliminate_inner(0);
+  return inner_positive_ && eliminate_nodes();
 }
 
 bool ChainSystem::solve(double damping, ChainStep& step) {
@@ -108,6 +113,8 @@ bool ChainSystem::solve(double damping, ChainStep& step) {
   if (!inner_positive_ || !eliminate_nodes()) return false;
   const Index k = layout_.node;
   const Index m = layout_.shared;
+  shared_factor_ = shared_;
+  if (m > 0 && !blas::cholesky_lower(size_of(m), shared_factor_.data(), size_of(m))) return false;
   const std::size_t windows = factors_.size();
   // Forwards: L y = -g.
   ChainStep x;

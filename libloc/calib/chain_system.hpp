@@ -46,6 +46,11 @@ class ChainSystem {
   Eigen::VectorXd& gradient(int window) { return gradients_[static_cast<std::size_t>(window)]; }
   /// @}
 
+  /// Eliminates all but the shared unknowns from H. @returns false when what is eliminated is not positive definite.
+  bool reduce();
+  /// What is left of H for the shared unknowns: their information. Of the last reduce() or solve().
+  const Eigen::MatrixXd& shared_information() const { return shared_; }
+
   /// Solves (H + damping diag(H)) x = -g. @returns false when the matrix is not positive definite; step is left as it
   /// is.
   bool solve(double damping, ChainStep& step);
@@ -54,11 +59,11 @@ class ChainSystem {
   double damped_square(const ChainStep& step) const;
   /// @}
 
-  /// Inverse of H's part for the shared unknowns with all others eliminated: their covariance, in units of the
-  /// residuals' variance. Of the last solve().
+  /// Inverse of shared_information(): the covariance of the shared unknowns, in units of the residuals' variance. Of
+  /// the last solve().
   Eigen::MatrixXd shared_covariance() const;
   /// What each group of windows alone adds to the gradient of the shared unknowns when the others are eliminated, one
-  /// column a group. Of the last solve(). @param group of each window, in [0, groups)
+  /// column a group. Of the last reduce() or solve(). @param group of each window, in [0, groups)
   Eigen::MatrixXd shared_pulls(const std::vector<int>& group, int groups) const;
 
  private:
@@ -73,6 +78,7 @@ class ChainSystem {
   bool inner_positive_ = false;
   std::vector<Eigen::MatrixXd> node_factors_;    // L of each node
   std::vector<Eigen::MatrixXd> node_couplings_;  // of the next node and the shared ones to it: (node + shared) x node
+  Eigen::MatrixXd shared_;
   Eigen::MatrixXd shared_factor_;
 };
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "libloc/calib/spline_detail.hpp"
 #include "libloc/core/check.hpp"
 #include "libloc/geometry/so3.hpp"
 
@@ -77,17 +78,18 @@ EulerTrajectory::EulerTrajectory(const Eigen::Quaterniond& mean, const SplineGri
           static_cast<double>(spline_.control_points().rows()), "must be 6");
 }
 
-RotationState EulerTrajectory::rotation_at(double t_s, RotationJacobians* jacobians) const {
-  require_finite("t_s", t_s);
-  const int order = grid().order;
-  const SplinePlace place = place_of(grid(), t_s);
-  const SplineWeights w = weights_at(order, grid().spacing_s, place.u);
-  const Eigen::Vector3d phi = sum_of(control_points(), 0, place, order, w.value);
-  const Eigen::Vector3d rate = sum_of(control_points(), 0, place, order, w.first);
-  const Eigen::Vector3d acceleration = sum_of(control_points(), 0, place, order, w.second);
+RotationState calib::angles_at(const Eigen::Quaterniond& mean, const Eigen::Ref<const Eigen::MatrixXd>& angles,
+                               const SplineWeights& w, RotationJacobians* jacobians) {
+  const Eigen::Index order = angles.cols();
+  const auto sum = [&](const std::array<double, kMaxSplineOrder>& weights) -> Eigen::Vector3d {
+    return angles * Eigen::Map<const Eigen::VectorXd>(weights.data(), order);
+  };
+  const Eigen::Vector3d phi = sum(w.value);
+  const Eigen::Vector3d rate = sum(w.first);
+  const Eigen::Vector3d acceleration = sum(w.second);
   const Eigen::Matrix3d S = angle_rate_matrix(phi);
   const Eigen::Matrix3d S_by_phi = angle_rate_matrix_derivative(phi, rate);  // of S(phi) rate
-  RotationState out{mean_ * rotation_from_angles(phi), S * rate, S_by_phi * rate + S * acceleration};
+  RotationState out{mean * rotation_from_angles(phi), S * rate, S_by_phi * rate + S * acceleration};
   out.rotation.normalize();
   if (jacobians == nullptr) return out;
   // Of S'(phi) rate = (d(S(phi) rate)/d phi) rate by phi: its first column depends on phi_1 and phi_2, the second too.
@@ -108,13 +110,21 @@ RotationState EulerTrajectory::rotation_at(double t_s, RotationJacobians* jacobi
     by_rate.col(i) += angle_rate_matrix_derivative(phi, Eigen::Vector3d::Unit(i)) * rate;
   }
   const Eigen::Matrix3d by_phi = bend + angle_rate_matrix_derivative(phi, acceleration);
-  jacobians->first = place.segment;
   for (std::size_t j = 0; j < static_cast<std::size_t>(order); ++j) {
     jacobians->rotation[j] = S * w.value[j];
     jacobians->angular_velocity[j] = S_by_phi * w.value[j] + S * w.first[j];
     jacobians->angular_acceleration[j] = by_phi * w.value[j] + by_rate * w.first[j] + S * w.second[j];
   }
   return out;
+}
+
+RotationState EulerTrajectory::rotation_at(double t_s, RotationJacobians* jacobians) const {
+  require_finite("t_s", t_s);
+  const int order = grid().order;
+  const SplinePlace place = place_of(grid(), t_s);
+  if (jacobians != nullptr) jacobians->first = place.segment;
+  return calib::angles_at(mean_, control_points().block(0, place.segment, 3, order),
+                          weights_at(order, grid().spacing_s, place.u), jacobians);
 }
 
 PoseState EulerTrajectory::at(double t_s) const {

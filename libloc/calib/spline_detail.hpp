@@ -24,6 +24,10 @@ RotationStep step_between(const Eigen::Quaterniond& from, const Eigen::Quaternio
 RotationState rotation_at(const Eigen::Quaterniond& first, std::span<const RotationStep> steps,
                           const SplineWeights& weights, RotationJacobians* jacobians);
 
+/// The three angles likewise (euler_trajectory.hpp). @param angles of the segment's control points, 3 x order
+RotationState angles_at(const Eigen::Quaterniond& mean, const Eigen::Ref<const Eigen::MatrixXd>& angles,
+                        const SplineWeights& weights, RotationJacobians* jacobians);
+
 /// Fits over a grid that is given. Rotations need times that cover it, in steps well below the spacing. @{
 Eigen::MatrixXd fit_vectors(const SplineGrid& grid, std::span<const double> times_s, const Eigen::MatrixXd& values,
                             double smoothing);

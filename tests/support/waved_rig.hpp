@@ -55,6 +55,11 @@ inline WavedRig wave(const WavedRigOptions& options, std::uint64_t seed) {
   out.camera.intrinsics_px = {458.654, 457.296, 367.215, 248.375};
   out.camera.distortion_model = DistortionModel::kRadtan;
   out.camera.distortion = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05};
+  IntrinsicsQuality exact;
+  exact.method = "simulation";
+  exact.intrinsics_sigma_px.setZero();
+  exact.distortion_sigma.setZero();
+  out.camera.intrinsics_quality = exact;
   out.T_camera_imu = {so3::exp(Vector3d(0.1, -1.4, 0.3)), Vector3d(0.05, -0.03, 0.02)};
   const Pose3 T_imu_camera = out.T_camera_imu.inverse();
   // The board's middle, seen from 0.6 m straight ahead when nothing turns; the board leans against the vertical.

@@ -1,0 +1,30 @@
+// What a solved camera-IMU calibration is worth: deviations, checks of what was held, verdict. Internal to calib.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "libloc/calib/camera_imu.hpp"
+#include "libloc/calib/camera_imu_problem.hpp"
+
+namespace loc::calib {
+
+/// The normal equations of the shared unknowns at the solution, everything else eliminated; also for unknowns that were
+/// held.
+struct SharedEquations {
+  SharedLayout estimated;
+  SharedLayout all;
+  Eigen::MatrixXd information;  // by all
+  Eigen::MatrixXd pulls;        // gradient by all, one column a group of windows
+};
+
+/// Deviations and covariance of each camera's mounting, and what was held: one step from where it is.
+/// @param intrinsics_sigma of each camera, for intrinsics that were not refined
+void put_deviations(const SharedEquations& equations, const CameraImuState& state,
+                    std::span<const Vector8d> intrinsics_sigma, CameraImuFit& fit);
+
+/// The verdict. @param too_fast the motion is more than the knots can follow
+void judge(const CameraImuOptions& options, bool too_fast, double length_s, CameraImuFit& fit);
+
+}  // namespace loc::calib
