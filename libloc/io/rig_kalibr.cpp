@@ -66,23 +66,31 @@ Pose3 read_euroc_pose(YamlBlock& block) {
   return pose_from(block, "T_BS", Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(data.data()));
 }
 
-void write_numbers(std::ostream& out, const char* indent, const char* key, const std::vector<double>& values) {
+// Kalibr reads with PyYAML and insists on floats: 1e-05 would be a word there, 458 an integer.
+std::string kalibr_number(double value) {
   std::string text;
-  for (const double value : values) {
-    if (!text.empty()) text += ", ";
-    io::append_number(text, value);
-  }
-  out << indent << key << ": [" << text << "]\n";
+  io::append_number(text, value);
+  if (text.find('.') == std::string::npos) text.insert(std::min(text.find('e'), text.size()), ".0");
+  return text;
+}
+
+template <class Values>
+std::string kalibr_list(const Values& values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "" : ", ") + kalibr_number(value);
+  return "[" + text + "]";
 }
 
 void write_number(std::ostream& out, const char* key, double value) {
-  std::string text;
-  io::append_number(text, value);
-  out << key << ": " << text << "\n";
+  out << key << ": " << kalibr_number(value) << "\n";
 }
 
-std::vector<double> to_vector(const Eigen::Vector4d& v) {
-  return {v(0), v(1), v(2), v(3)};
+// Those that T_cn_cnm1 links to camera i of n.
+std::string neighbours(std::size_t i, std::size_t n) {
+  std::string text;
+  if (i > 0) text = std::to_string(i - 1);
+  if (i + 1 < n) text += (text.empty() ? "" : ", ") + std::to_string(i + 1);
+  return "[" + text + "]";
 }
 
 Rig checked(const std::filesystem::path& path, Rig rig) {
@@ -158,27 +166,21 @@ void write_kalibr_camchain(const std::filesystem::path& path, const Rig& rig) {
     const auto write_pose = [&](const char* key, const Pose3& pose) {
       const Eigen::Matrix4d m = pose.matrix();
       out << "  " << key << ":\n";
-      for (int row = 0; row < 4; ++row) {
-        std::string text;
-        for (int column = 0; column < 4; ++column) {
-          if (column > 0) text += ", ";
-          io::append_number(text, m(row, column));
-        }
-        out << "  - [" << text << "]\n";
-      }
+      for (int row = 0; row < 4; ++row) out << "  - " << kalibr_list(Eigen::Vector4d(m.row(row))) << "\n";
     };
     out << "cam" << i << ":\n";
     write_pose("T_cam_imu", T_camera_imu);
     if (i > 0) write_pose("T_cn_cnm1", T_camera_imu * rig.cameras[i - 1].T_body_camera);
+    out << "  cam_overlaps: " << neighbours(i, rig.cameras.size()) << "\n";
     out << "  camera_model: pinhole\n";
     const bool none = camera.distortion_model == DistortionModel::kNone;
-    write_numbers(out, "  ", "distortion_coeffs", none ? std::vector<double>{} : to_vector(camera.distortion));
+    out << "  distortion_coeffs: " << (none ? "[]" : kalibr_list(camera.distortion)) << "\n";
     out << "  distortion_model: "
         << (none                                                       ? "none"
             : camera.distortion_model == DistortionModel::kEquidistant ? "equidistant"
                                                                        : "radtan")
         << "\n";
-    write_numbers(out, "  ", "intrinsics", to_vector(camera.intrinsics_px));
+    out << "  intrinsics: " << kalibr_list(camera.intrinsics_px) << "\n";
     out << "  resolution: [" << camera.width_px << ", " << camera.height_px << "]\n";
     out << "  rostopic: /cam" << i << "/image_raw\n";
     write_number(out, "  timeshift_cam_imu", camera.time_offset_s);

@@ -69,6 +69,19 @@ IntrinsicsQuality read_intrinsics_quality(YamlBlock block) {
   return quality;
 }
 
+MountingQuality read_mounting_quality(YamlBlock block) {
+  MountingQuality quality;
+  read_origin(block, quality);
+  quality.pictures = block.integer("pictures");
+  if (block.has("rotation_sigma")) quality.rotation_sigma = block.vector3("rotation_sigma");
+  if (block.has("translation_sigma")) quality.translation_sigma = block.vector3("translation_sigma");
+  quality.time_offset_sigma_s = optional_number(block, "time_offset_sigma_s");
+  quality.line_delay_s = optional_number(block, "line_delay_s");
+  quality.line_delay_sigma_s = optional_number(block, "line_delay_sigma_s");
+  block.finish();
+  return quality;
+}
+
 TriadCalibration read_triad(YamlBlock block) {
   TriadCalibration triad;
   triad.bias = block.vector3("bias");
@@ -137,6 +150,7 @@ CameraCalibration read_camera(YamlBlock block) {
   if (block.has("intrinsics_quality")) {
     camera.intrinsics_quality = read_intrinsics_quality(block.block("intrinsics_quality"));
   }
+  if (block.has("mounting_quality")) camera.mounting_quality = read_mounting_quality(block.block("mounting_quality"));
   block.finish();
   return camera;
 }
@@ -233,6 +247,17 @@ void emit_quality(YAML::Emitter& out, const IntrinsicsQuality& quality) {
   end_quality(out, quality);
 }
 
+void emit_quality(YAML::Emitter& out, const MountingQuality& quality) {
+  begin_quality(out, "mounting_quality", quality);
+  out << YAML::Key << "pictures" << YAML::Value << std::to_string(quality.pictures);
+  emit_if_whole(out, "rotation_sigma", quality.rotation_sigma);
+  emit_if_whole(out, "translation_sigma", quality.translation_sigma);
+  emit_if_known(out, "time_offset_sigma_s", quality.time_offset_sigma_s);
+  emit_if_known(out, "line_delay_s", quality.line_delay_s);
+  emit_if_known(out, "line_delay_sigma_s", quality.line_delay_sigma_s);
+  end_quality(out, quality);
+}
+
 void emit_triad(YAML::Emitter& out, const TriadCalibration& triad) {
   out << YAML::BeginMap << YAML::Key << "bias" << YAML::Value;
   emit_list(out, triad.bias);
@@ -305,6 +330,7 @@ void emit_camera(YAML::Emitter& out, const CameraCalibration& camera) {
   emit_number(out, "time_offset_s", camera.time_offset_s);
   emit_number(out, "rate_hz", camera.rate_hz);
   if (camera.intrinsics_quality) emit_quality(out, *camera.intrinsics_quality);
+  if (camera.mounting_quality) emit_quality(out, *camera.mounting_quality);
   out << YAML::EndMap;
 }
 

@@ -39,6 +39,24 @@
 //         q_wxyz: [1, 0, 0, 0]
 //       time_offset_s: 0                      # t_imu = t_camera + time_offset_s
 //       rate_hz: 20
+//       intrinsics_quality:                   # optional: how they were found
+//         verdict: ok
+//         method: target
+//         pictures: 40
+//         intrinsics_sigma: [0, 0, 0, 0]      # optional [px]: one standard deviation, of fx fy cx cy
+//         distortion_sigma: [0, 0, 0, 0]      # optional
+//         reprojection_rms_px: 0.2            # optional
+//         reasons: []
+//       mounting_quality:                     # optional: how T_body_camera and time_offset_s were found
+//         verdict: ok
+//         method: camera-imu
+//         pictures: 1200
+//         rotation_sigma: [0, 0, 0]           # optional [rad]: small turns of the camera about the body's axes
+//         translation_sigma: [0, 0, 0]        # optional [m]: of T_body_camera's translation, along the body's axes
+//         time_offset_sigma_s: 5.0e-6         # optional
+//         line_delay_s: 2.0e-5                # optional: a rolling shutter's time from one row to the next
+//         line_delay_sigma_s: 1.0e-7          # optional
+//         reasons: []
 //   gps:
 //     antenna_in_body: [0, 0, 0]              # [m]
 //     time_offset_s: 0                        # optional: t_imu = t_gps + time_offset_s
@@ -91,8 +109,10 @@ std::vector<CameraCalibration> read_kalibr_camchain(const std::filesystem::path&
 /// model other than calibrated (scale-misalignment: its matrices), a T_i_b that is not the identity, a time_offset.
 ImuCalibration read_kalibr_imu(const std::filesystem::path& path);
 
-/// For Kalibr's tools; cameras become cam0, cam1, …. @throws as write_rig; std::invalid_argument when the rig has no
-/// camera (no IMU).
+/// For Kalibr's tools, which want a decimal point in every number that is not a count; cameras become cam0, cam1, …,
+/// each with T_cam_imu, timeshift_cam_imu and, from cam1 on, T_cn_cnm1. cam_overlaps names the neighbours, because a
+/// rig does not say what cameras see together. @throws as write_rig; std::invalid_argument when the rig has no camera
+/// (no IMU).
 void write_kalibr_camchain(const std::filesystem::path& path, const Rig& rig);
 void write_kalibr_imu(const std::filesystem::path& path, const Rig& rig);
 

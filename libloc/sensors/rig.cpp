@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "libloc/core/check.hpp"
+#include "libloc/geometry/so3.hpp"
 
 namespace loc {
 namespace {
@@ -15,6 +16,8 @@ namespace {
 constexpr double kLargestGpsOffset = 86'400;  // [s]
 // No oscillator is that wrong: a unit was mistaken.
 constexpr double kLargestSkew = 10'000;  // [ppm]
+// A picture of 480 rows would take five seconds: a unit was mistaken.
+constexpr double kLargestLineDelay = 0.01;  // [s]
 
 // One line of print: it becomes a line of a log.
 void require_line(const std::string& name, const std::string& text) {
@@ -58,6 +61,31 @@ void IntrinsicsQuality::check(const std::string& name) const {
   require_known_or_not_negative(name + ".reprojection_rms_px", reprojection_rms_px);
 }
 
+void MountingQuality::set_deviations(const Pose3& T_body_camera, const Eigen::Matrix<double, 7, 7>& covariance) {
+  require(covariance.allFinite() && covariance.diagonal().minCoeff() >= 0,
+          "covariance: must be finite, with variances that are not negative");
+  // With R_bc, t_bc of T_body_camera, a turn e, and a shift d of T_camera_body's translation:
+  // t_bc becomes Exp(-e) (t_bc - R_bc d) = t_bc + [t_bc]x e - R_bc d, R_bc becomes Exp(-e) R_bc.
+  Eigen::Matrix<double, 3, 6> J;
+  J << so3::hat(T_body_camera.translation), -T_body_camera.rotation.toRotationMatrix();
+  const Eigen::Matrix3d of_translation = J * covariance.topLeftCorner<6, 6>() * J.transpose();
+  require(of_translation.diagonal().minCoeff() >= 0, "covariance: must be positive semidefinite");
+  rotation_sigma = covariance.diagonal().head<3>().cwiseSqrt();
+  translation_sigma = of_translation.diagonal().cwiseSqrt();
+  time_offset_sigma_s = std::sqrt(covariance(6, 6));
+}
+
+void MountingQuality::check(const std::string& name) const {
+  check_origin(name, *this);
+  require(pictures >= 0, name + ".pictures", static_cast<double>(pictures), "must not be negative");
+  require_whole(name + ".rotation_sigma", rotation_sigma);
+  require_whole(name + ".translation_sigma", translation_sigma);
+  require_known_or_not_negative(name + ".time_offset_sigma_s", time_offset_sigma_s);
+  require(std::isnan(line_delay_s) || std::abs(line_delay_s) <= kLargestLineDelay, name + ".line_delay_s", line_delay_s,
+          "must be within +-0.01");
+  require_known_or_not_negative(name + ".line_delay_sigma_s", line_delay_sigma_s);
+}
+
 void TriadCalibration::check(const std::string& name) const {
   require(bias.allFinite(), name + ".bias: must be finite");
   require(matrix.allFinite(), name + ".matrix: must be finite");
@@ -80,6 +108,7 @@ void CameraCalibration::check() const {
   require_finite(who + ".timeshift_cam_imu", time_offset_s);
   require_not_negative(who + ".rate_hz", rate_hz);
   if (intrinsics_quality) intrinsics_quality->check(who + ".intrinsics_quality");
+  if (mounting_quality) mounting_quality->check(who + ".mounting_quality");
 }
 
 void ClockCalibration::check() const {
@@ -151,7 +180,10 @@ std::vector<RigDoubt> doubts(const Rig& rig) {
     look("imu.accelerometer", rig.imu->accelerometer.quality);
   }
   if (rig.magnetometer) look("magnetometer", rig.magnetometer->triad.quality);
-  for (const CameraCalibration& camera : rig.cameras) look(camera.name + ".intrinsics", camera.intrinsics_quality);
+  for (const CameraCalibration& camera : rig.cameras) {
+    look(camera.name + ".intrinsics", camera.intrinsics_quality);
+    look(camera.name + ".mounting", camera.mounting_quality);
+  }
   return out;
 }
 

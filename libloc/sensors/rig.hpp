@@ -69,6 +69,33 @@ struct IntrinsicsQuality {
   void check(const std::string& name) const;
 };
 
+/// How it was found where a camera sits on the IMU and by how much their clocks differ, and how far that may be
+/// trusted. A deviation that is not known is NaN.
+struct MountingQuality {
+  Verdict verdict = Verdict::kOk;
+  std::string method;         ///< "camera-imu"
+  std::int64_t pictures = 0;  ///< that were used
+  /// Of T_body_camera's rotation: a small turn of the camera about the body's axes [rad].
+  Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Constant(kUnknown);
+  /// Of T_body_camera's translation, the camera's place along the body's axes [m].
+  Eigen::Vector3d translation_sigma = Eigen::Vector3d::Constant(kUnknown);
+  double time_offset_sigma_s = kUnknown;
+  /// A rolling shutter's time from one row to the next; negative when it begins below. NaN: nobody looked. It is kept
+  /// here because the estimators take a picture as of one time. @{
+  double line_delay_s = kUnknown;
+  double line_delay_sigma_s = kUnknown;
+  /// @}
+  std::vector<std::string> reasons;  ///< of the verdict, one line each
+
+  /// The three deviations from what a camera-IMU calibration finds, which is the inverse of what a rig holds.
+  /// @param covariance of a small turn about the body's axes [rad] (R_camera_body Exp(turn)), of the translation of
+  /// T_camera_body [m], and of the time offset [s]
+  /// @throws std::invalid_argument when it is not finite or has a variance below zero.
+  void set_deviations(const Pose3& T_body_camera, const Eigen::Matrix<double, 7, 7>& covariance);
+  /// @throws std::invalid_argument naming the field. @param name goes into the message.
+  void check(const std::string& name) const;
+};
+
 struct CameraCalibration {
   std::string name;  ///< "cam0"
   std::int32_t width_px = 0;
@@ -80,6 +107,7 @@ struct CameraCalibration {
   double time_offset_s = 0;                             ///< t_imu = t_camera + time_offset (Kalibr's timeshift_cam_imu)
   double rate_hz = 0;                                   ///< nominal; 0 when unknown
   std::optional<IntrinsicsQuality> intrinsics_quality;  ///< none: nobody measured it, or the file does not say
+  std::optional<MountingQuality> mounting_quality;      ///< of T_body_camera and time_offset_s; none: likewise
 
   /// @throws std::invalid_argument naming the camera, the field and its value.
   void check() const;
@@ -125,7 +153,7 @@ Measurement calibrated(const Rig& rig, Measurement measurement);
 /// What a user should hear about a rig before it is used: a sentence for each calibration that was refused (and written
 /// all the same) or came with a warning.
 struct RigDoubt {
-  std::string block;  ///< "imu.gyroscope", "imu.accelerometer", "magnetometer", "cam0.intrinsics"
+  std::string block;  ///< "imu.gyroscope", "imu.accelerometer", "magnetometer", "cam0.intrinsics", "cam0.mounting"
   Verdict verdict = Verdict::kWarn;
   std::string text;
 };

@@ -343,6 +343,11 @@ void bind_io(py::module_& m) {
         "rig.yaml, Kalibr's camchain or imu.yaml, EuRoC's sensor.yaml: whichever it is.");
   m.def("write_rig", &loc::write_rig, py::arg("path"), py::arg("rig"),
         "Writes rig.yaml; read_rig gives the same numbers back.");
+  m.def("write_kalibr_camchain", &loc::write_kalibr_camchain, py::arg("path"), py::arg("rig"),
+        "The rig's cameras as Kalibr's camchain: cam0, cam1, ... with T_cam_imu, T_cn_cnm1 and timeshift_cam_imu "
+        "(t_imu = t_cam + shift). ValueError without a camera.");
+  m.def("write_kalibr_imu", &loc::write_kalibr_imu, py::arg("path"), py::arg("rig"),
+        "The IMU's noise and rate as Kalibr's imu.yaml. ValueError without an IMU.");
   m.def(
       "update_rig",
       [](const fs::path& path, const py::typing::Callable<void(py::object)>& change) {

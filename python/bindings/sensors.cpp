@@ -315,6 +315,38 @@ void bind_intrinsics_quality(py::module_& m) {
                    "(4,): of the distortion; 0 where the model has no such term");
 }
 
+void bind_mounting_quality(py::module_& m) {
+  using loc::MountingQuality;
+  py::class_<MountingQuality> quality(m, "MountingQuality",
+                                      "How it was found where a camera sits on the IMU and by how much their clocks "
+                                      "differ, and how far that may be trusted. What is not known is NaN.");
+  quality.def(py::init<>())
+      .def_readwrite("verdict", &MountingQuality::verdict)
+      .def_readwrite("method", &MountingQuality::method, "\"camera-imu\"")
+      .def_readwrite("pictures", &MountingQuality::pictures, "that were used")
+      .def_readwrite("time_offset_sigma_s", &MountingQuality::time_offset_sigma_s, "deviation of time_offset_s [s]")
+      .def_readwrite("line_delay_s", &MountingQuality::line_delay_s,
+                     "a rolling shutter's time from one row to the next [s]; negative when it begins below")
+      .def_readwrite("line_delay_sigma_s", &MountingQuality::line_delay_sigma_s, "its deviation [s]")
+      .def_property(
+          "reasons", [](const MountingQuality& self) { return self.reasons; },
+          [](MountingQuality& self, std::vector<std::string> reasons) { self.reasons = std::move(reasons); },
+          "Copies of the sentences, one line each: assign a list to change them.")
+      .def(
+          "set_deviations",
+          [](MountingQuality& self, const loc::Pose3& T_body_camera, const ArrayLike& covariance) {
+            self.set_deviations(T_body_camera, matrix(covariance, "covariance", 7, 7));
+          },
+          py::arg("T_body_camera"), py::arg("covariance"),
+          "Sets the deviations from what a camera-IMU calibration finds. covariance (7, 7): of a small turn about the "
+          "body's axes [rad] (R_camera_body Exp(turn)), of the translation of T_camera_body [m], of the time offset "
+          "[s].");
+  vector_property(quality, "rotation_sigma", &MountingQuality::rotation_sigma,
+                  "(3,) [rad]: small turns of the camera about the body's axes");
+  vector_property(quality, "translation_sigma", &MountingQuality::translation_sigma,
+                  "(3,) [m]: of T_body_camera's translation, along the body's axes");
+}
+
 void bind_clock_calibration(py::module_& m) {
   py::class_<ClockCalibration>(m, "ClockCalibration",
                                "What is known of the clock that stamps a stream. A figure that is not known is NaN.")
@@ -384,6 +416,8 @@ void bind_calibrations(py::module_& m) {
                    "(4,): k1 k2 p1 p2 (radtan) or k1..k4 (equidistant)");
   camera.def_readwrite("intrinsics_quality", &CameraCalibration::intrinsics_quality,
                        "How the intrinsics were found; None when nobody has said.");
+  camera.def_readwrite("mounting_quality", &CameraCalibration::mounting_quality,
+                       "How T_body_camera and time_offset_s were found; None when nobody has said.");
 }
 
 void bind_rig(py::module_& m) {
@@ -422,6 +456,7 @@ void bind_sensors(py::module_& m) {
   bind_measurements(m);
   bind_quality(m);
   bind_intrinsics_quality(m);
+  bind_mounting_quality(m);
   bind_calibrations(m);
   bind_clock_calibration(m);
   bind_rig(m);

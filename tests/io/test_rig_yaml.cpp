@@ -6,6 +6,7 @@
 
 #include "libloc/core/random.hpp"
 #include "libloc/io/rig_yaml.hpp"
+#include "libloc/io/yaml_block.hpp"
 #include "tests/support/comma_locale.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/sources.hpp"
@@ -47,6 +48,20 @@ IntrinsicsQuality full_intrinsics_quality(Random& random) {
   return quality;
 }
 
+MountingQuality full_mounting_quality(Random& random) {
+  MountingQuality quality;
+  quality.verdict = Verdict::kWarn;
+  quality.method = "camera-imu";
+  quality.pictures = 9'007'199'254'740'995;
+  quality.rotation_sigma = random.normal3().cwiseAbs();
+  quality.translation_sigma = random.normal3().cwiseAbs();
+  quality.time_offset_sigma_s = 1e-5 / 3;
+  quality.line_delay_s = -2e-5 / 3;
+  quality.line_delay_sigma_s = 1e-7 / 3;
+  quality.reasons = {"hardly any turn about z"};
+  return quality;
+}
+
 Rig full_rig() {
   Random random(11);
   Rig rig;
@@ -74,7 +89,9 @@ Rig full_rig() {
     camera.time_offset_s = -1.0 / 7;
     camera.rate_hz = 20;
     camera.intrinsics_quality = full_intrinsics_quality(random);
+    camera.mounting_quality = full_mounting_quality(random);
     if (i == 1) camera.intrinsics_quality.emplace().method = "target";  // the rest is not known
+    if (i == 1) camera.mounting_quality.emplace().method = "camera-imu";
     rig.cameras.push_back(camera);
   }
   rig.gps = GpsCalibration{{0.1, -0.2, 1.0 / 3}};
@@ -128,6 +145,19 @@ void expect_same(const std::optional<IntrinsicsQuality>& a, const std::optional<
   expect_same_or_unknown(a->intrinsics_sigma_px, b->intrinsics_sigma_px);
   expect_same_or_unknown(a->distortion_sigma, b->distortion_sigma);
   expect_same(a->reprojection_rms_px, b->reprojection_rms_px);
+  EXPECT_EQ(a->reasons, b->reasons);
+}
+
+void expect_same(const std::optional<MountingQuality>& a, const std::optional<MountingQuality>& b) {
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a->verdict, b->verdict);
+  EXPECT_EQ(a->method, b->method);
+  EXPECT_EQ(a->pictures, b->pictures);
+  expect_same_or_unknown(a->rotation_sigma, b->rotation_sigma);
+  expect_same_or_unknown(a->translation_sigma, b->translation_sigma);
+  expect_same(a->time_offset_sigma_s, b->time_offset_sigma_s);
+  expect_same(a->line_delay_s, b->line_delay_s);
+  expect_same(a->line_delay_sigma_s, b->line_delay_sigma_s);
   EXPECT_EQ(a->reasons, b->reasons);
 }
 
@@ -191,6 +221,7 @@ TEST_F(RigYaml, what_is_written_is_read_to_the_last_bit) {
     EXPECT_EQ(a.distortion_model, b.distortion_model);
     EXPECT_EQ(a.distortion, b.distortion);
     expect_same(a.intrinsics_quality, b.intrinsics_quality);
+    expect_same(a.mounting_quality, b.mounting_quality);
     EXPECT_EQ(a.T_body_camera.rotation.coeffs(), b.T_body_camera.rotation.coeffs());
     EXPECT_EQ(a.T_body_camera.translation, b.T_body_camera.translation);
     EXPECT_EQ(a.time_offset_s, b.time_offset_s);
@@ -238,11 +269,18 @@ TEST_F(RigYaml, optional_keys_are_as_strict_as_the_others) {
   expect_error("measured: [gyro", "measured: [gyra", {"changed.yaml", "noise_measured", "gyra"});
   expect_error("time_offset_s: -0.2", "time_offset: -0.2", {"gps.time_offset' is not known"});
   expect_error("time_offset_s: -0.2", "time_offset_s: 1e9", {"gps.time_offset_s", "a day"});
-  expect_error("time_offset_sigma_s: ", "time_offset_sigma_s: -", {"gps.time_offset_sigma_s"});
+  expect_error("-0.2\n  time_offset_sigma_s: ", "-0.2\n  time_offset_sigma_s: -", {"gps.time_offset_sigma_s"});
   expect_error("reference: \"host\"", "referense: \"host\"", {"clocks[0].reference' is missing"});
   expect_error("stream: \"imu\"", "stream: \"imu\"\n    drift: 1", {"clocks[0].drift' is not known"});
   expect_error("skew_ppm: -16", "skew_ppm: -16000000", {"clocks.imu.skew_ppm"});
   expect_error("clocks:", "clocks: 1 #", {"changed.yaml"});
+  expect_error("mounting_quality:", "mounting_qualitie:", {"cameras[0].mounting_qualitie' is not known"});
+  const std::string mounting = "cameras[0].mounting_quality.";
+  expect_error("method: \"camera-imu\"", "methot: \"camera-imu\"", {mounting + "method' is missing"});
+  expect_error("pictures: 9007199254740995", "pictures: 1.5", {mounting + "pictures", "whole"});
+  expect_error("rotation_sigma: [", "rotation_sigma: [0, ", {mounting + "rotation_sigma", "3 numbers"});
+  expect_error("translation_sigma: [", "translation_sigmas: [", {mounting + "translation_sigmas' is not known"});
+  expect_error("line_delay_s: -6.", "line_delay_s: -60000.", {"cam0.mounting_quality.line_delay_s = -0.06"});
 }
 
 TEST_F(RigYaml, an_update_changes_its_block_and_keeps_the_rest_bit_for_bit) {
@@ -411,6 +449,56 @@ TEST_F(RigYaml, kalibr_files_that_are_written_are_read) {
   EXPECT_EQ(imu.rate_hz, 200);
   EXPECT_THROW(write_kalibr_camchain(file("x.yaml"), Rig{}), std::invalid_argument);
   EXPECT_THROW(write_kalibr_imu(file("x.yaml"), Rig{}), std::invalid_argument);
+}
+
+// Kalibr's reader is PyYAML with checks by type: a float needs its point, 1e-05 is a word there.
+TEST_F(RigYaml, numbers_are_written_as_kalibr_wants_them) {
+  Rig rig = full_rig();
+  for (CameraCalibration& camera : rig.cameras) {
+    camera.intrinsics_px = {458, 457.5, 367, 248};
+    camera.distortion = {1e-5, 0, -2e-300, 3e22};
+    camera.time_offset_s = 0;
+  }
+  rig.cameras[1].distortion_model = DistortionModel::kNone;
+  rig.cameras.push_back(rig.cameras[0]);
+  write_kalibr_camchain(file("camchain.yaml"), rig);
+  const std::string text = test::read_file(file("camchain.yaml"));
+  const auto count = [&](const std::string& part) {
+    std::size_t n = 0;
+    for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
+    return n;
+  };
+  EXPECT_EQ(count("  intrinsics: [458.0, 457.5, 367.0, 248.0]\n"), 3U) << text;
+  EXPECT_EQ(count("  distortion_coeffs: [1.0e-05, 0.0, -2.0e-300, 3.0e+22]\n"), 2U) << text;
+  EXPECT_EQ(count("  distortion_coeffs: []\n  distortion_model: none\n"), 1U) << text;
+  EXPECT_EQ(count("  timeshift_cam_imu: 0.0\n"), 3U) << text;
+  EXPECT_EQ(count("  - [0.0, 0.0, 0.0, 1.0]\n"), 5U) << "T_cam_imu of each, T_cn_cnm1 of two\n" << text;
+  EXPECT_EQ(count("  resolution: [752, 480]\n"), 3U) << text;
+  EXPECT_LT(text.find("cam_overlaps: [1]"), text.find("cam_overlaps: [0, 2]"));
+  EXPECT_EQ(count("cam_overlaps: [1]\n"), 2U) << text;
+  EXPECT_EQ(read_kalibr_camchain(file("camchain.yaml"))[2].distortion, rig.cameras[2].distortion);
+
+  rig.imu->noise.gyroscope_random_walk = 2e-5;
+  write_kalibr_imu(file("imu.yaml"), rig);
+  const std::string imu = test::read_file(file("imu.yaml"));
+  EXPECT_NE(imu.find("gyroscope_random_walk: 2.0e-05\n"), std::string::npos) << imu;
+  EXPECT_NE(imu.find("update_rate: 200.0\n"), std::string::npos) << imu;
+}
+
+TEST_F(RigYaml, a_camchain_tells_where_each_camera_is_by_the_one_before) {
+  Rig rig = full_rig();
+  rig.cameras[0].time_offset_s = 0.002;  // a stamp of the camera's clock plus this is the IMU's
+  write_kalibr_camchain(file("camchain.yaml"), rig);
+  io::YamlBlock chain = io::YamlBlock::load(file("camchain.yaml"), false);
+  io::YamlBlock first = chain.block("cam0");
+  io::YamlBlock second = chain.block("cam1");
+  EXPECT_FALSE(first.has("T_cn_cnm1"));
+  EXPECT_EQ(first.number("timeshift_cam_imu"), 0.002);
+  const Eigen::Vector4d in_body(0.4, -1, 2, 1);
+  const Eigen::Vector4d in_first = first.matrix("T_cam_imu", 4, 4) * in_body;
+  const Eigen::Vector4d in_second = second.matrix("T_cam_imu", 4, 4) * in_body;
+  EXPECT_LT((in_first.head<3>() - rig.cameras[0].T_body_camera.inverse() * in_body.head<3>()).norm(), 1e-14);
+  EXPECT_LT((second.matrix("T_cn_cnm1", 4, 4) * in_first - in_second).norm(), 1e-14);
 }
 
 TEST_F(RigYaml, a_camchain_without_imu_is_chained_from_the_first_camera) {

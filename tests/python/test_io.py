@@ -156,6 +156,58 @@ def test_rig_carries_what_calibration_says(tmp_path):
     assert path.read_text() == before
 
 
+def test_rig_tells_how_well_a_camera_is_mounted(tmp_path):
+    camera = libloc.CameraCalibration()
+    camera.name, camera.width_px, camera.height_px = "cam0", 752, 480
+    camera.intrinsics_px = [458, 457, 367, 248]
+    camera.T_body_camera = libloc.Pose3.exp([0.1, 0, 0, 0, 0, 0])
+    camera.time_offset_s = 0.002
+    assert camera.mounting_quality is None
+    quality = libloc.MountingQuality()
+    assert np.isnan(quality.rotation_sigma).all()
+    assert np.isnan(quality.line_delay_s)
+    quality.verdict, quality.method, quality.pictures = libloc.Verdict.WARN, "camera-imu", 1200
+    quality.line_delay_s, quality.line_delay_sigma_s = 2e-5, 1e-7
+    quality.reasons = ["hardly any turn about z"]
+    quality.set_deviations(camera.T_body_camera, np.diag([1e-3, 2e-3, 3e-3, 4e-4, 5e-4, 6e-4, 7e-6]) ** 2)
+    camera.mounting_quality = quality
+    rig = libloc.Rig()
+    rig.cameras = [camera, camera]
+    path = tmp_path / "rig.yaml"
+    libloc.write_rig(path, rig)
+    back = libloc.read_rig(path)
+    got = back.cameras[0].mounting_quality
+    assert (got.verdict, got.method, got.pictures) == (libloc.Verdict.WARN, "camera-imu", 1200)
+    np.testing.assert_allclose(got.rotation_sigma, [1e-3, 2e-3, 3e-3], rtol=1e-12)
+    # The camera's place 0.1 m along x also moves by turns about y and z.
+    np.testing.assert_allclose(
+        got.translation_sigma, np.hypot([0, 3e-4, 2e-4], [4e-4, 5e-4, 6e-4]), rtol=1e-12
+    )
+    assert got.time_offset_sigma_s == 7e-6
+    assert (got.line_delay_s, got.line_delay_sigma_s) == (2e-5, 1e-7)
+    assert got.reasons == ["hardly any turn about z"]
+    assert [(block, verdict) for block, verdict, _ in back.doubts()] == [
+        ("cam0.mounting", libloc.Verdict.WARN)
+    ] * 2
+    with pytest.raises(ValueError, match="covariance"):
+        quality.set_deviations(camera.T_body_camera, np.eye(6))
+
+    chain = tmp_path / "camchain.yaml"
+    libloc.write_kalibr_camchain(chain, rig)
+    text = chain.read_text()
+    assert text.count("timeshift_cam_imu: 0.002\n") == 2
+    assert "T_cn_cnm1:\n  - [1.0, 0.0, 0.0, 0.0]\n" in text
+    cameras = libloc.read_any_rig(chain).cameras
+    assert [c.name for c in cameras] == ["cam0", "cam1"]
+    assert cameras[1].T_body_camera.translation.tolist() == [0.1, 0, 0]
+    with pytest.raises(ValueError, match="IMU"):
+        libloc.write_kalibr_imu(tmp_path / "imu.yaml", rig)
+    rig.imu = libloc.ImuCalibration()
+    rig.imu.rate_hz = 200
+    libloc.write_kalibr_imu(tmp_path / "imu.yaml", rig)
+    assert libloc.read_any_rig(tmp_path / "imu.yaml").imu.rate_hz == 200
+
+
 def test_imu_noise():
     noise = libloc.ImuNoise(gyroscope_noise_density=1e-3)
     assert libloc.discretise(noise, 0.01).sigma_angular_velocity == pytest.approx(1e-2)

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "libloc/core/random.hpp"
+#include "libloc/geometry/so3.hpp"
 #include "libloc/sensors/imu_noise.hpp"
 #include "libloc/sensors/rig.hpp"
 #include "tests/support/numeric_jacobian.hpp"
@@ -123,6 +125,66 @@ TEST(Rig, EveryFieldOfTheQualityOfIntrinsicsIsChecked) {
   expect([](IntrinsicsQuality& q) { q.reasons = {"two\nlines"}; }, "reasons");
 }
 
+TEST(Rig, EveryFieldOfTheQualityOfAMountingIsChecked) {
+  const auto expect = [](auto change, const std::string& field) {
+    expect_refused(
+        [&](Rig& r) {
+          MountingQuality& q = r.cameras[0].mounting_quality.emplace();
+          q.method = "camera-imu";
+          q.check("fine");
+          change(q);
+        },
+        "cam0.mounting_quality." + field);
+  };
+  expect([](MountingQuality& q) { q.method = ""; }, "method");
+  expect([](MountingQuality& q) { q.pictures = -1; }, "pictures");
+  expect([](MountingQuality& q) { q.rotation_sigma = {0, 1, kNan}; }, "rotation_sigma");
+  expect([](MountingQuality& q) { q.translation_sigma = {0, 1, -1}; }, "translation_sigma");
+  expect([](MountingQuality& q) { q.time_offset_sigma_s = HUGE_VAL; }, "time_offset_sigma_s");
+  expect([](MountingQuality& q) { q.line_delay_s = 20; }, "line_delay_s = 20");  // microseconds
+  expect([](MountingQuality& q) { q.line_delay_sigma_s = -1; }, "line_delay_sigma_s");
+  expect([](MountingQuality& q) { q.reasons = {"two\nlines"}; }, "reasons");
+}
+
+TEST(Rig, DeviationsOfAMountingAreThoseOfTheInverse) {
+  Random random(5);
+  const Pose3 T_body_camera{random.rotation(), {0.3, -0.2, 0.5}};
+  const Pose3 T_camera_body = T_body_camera.inverse();
+  Eigen::Matrix<double, 7, 7> root;
+  for (double& entry : root.reshaped()) entry = 1e-3 * random.normal();
+  const Eigen::Matrix<double, 7, 7> covariance = root * root.transpose();
+  MountingQuality quality;
+  quality.set_deviations(T_body_camera, covariance);
+
+  // How each column of the root moves camera and clock: the covariance is the sum of the columns' squares.
+  Eigen::Matrix<double, 6, 7> moves;
+  for (int i = 0; i < 7; ++i) {
+    const auto moved = [&](double step) {
+      const Eigen::Vector<double, 7> d = step * root.col(i);
+      return Pose3{so3::boxplus(T_camera_body.rotation, d.head<3>()), T_camera_body.translation + d.segment<3>(3)}
+          .inverse();
+    };
+    const Pose3 ahead = moved(1e-3);
+    const Pose3 behind = moved(-1e-3);
+    const Eigen::Vector3d turn = so3::log(ahead.rotation * behind.rotation.conjugate());  // about body axes
+    moves.col(i) << turn / 2e-3, (ahead.translation - behind.translation) / 2e-3;
+  }
+  const Eigen::Vector<double, 6> sigma = moves.rowwise().norm();
+  EXPECT_TRUE(test::near(quality.rotation_sigma, Eigen::Vector3d(sigma.head<3>()), 1e-9));
+  EXPECT_TRUE(test::near(quality.translation_sigma, Eigen::Vector3d(sigma.tail<3>()), 1e-9));
+  EXPECT_DOUBLE_EQ(quality.time_offset_sigma_s, root.row(6).norm());
+
+  Eigen::Matrix<double, 7, 7> bad = covariance;
+  bad(2, 2) = -1;
+  EXPECT_THROW(quality.set_deviations(T_body_camera, bad), std::invalid_argument);
+  bad(2, 2) = kNan;
+  EXPECT_THROW(quality.set_deviations(T_body_camera, bad), std::invalid_argument);
+  bad.setIdentity();
+  bad(2, 4) = bad(4, 2) = -5;  // turn about z and shift along y
+  EXPECT_THROW(quality.set_deviations({Eigen::Quaterniond::Identity(), {1, 0, 0}}, bad), std::invalid_argument);
+  EXPECT_DOUBLE_EQ(quality.time_offset_sigma_s, root.row(6).norm()) << "what cannot be leaves it as it was";
+}
+
 TEST(Rig, EveryFieldOfAClockIsChecked) {
   const auto expect = [](auto change, const std::string& field) {
     expect_refused([&](Rig& r) { change(r.clocks[0]); }, field);
@@ -155,8 +217,12 @@ TEST(Rig, DoubtsTellOfWarningsAndOfWhatWasForced) {
   rig.imu->accelerometer.quality->reasons = {"10 poses"};
   rig.cameras[0].intrinsics_quality.emplace().verdict = Verdict::kWarn;
   rig.cameras[0].intrinsics_quality->reasons = {"no tilt"};
+  rig.cameras[0].mounting_quality.emplace().verdict = Verdict::kRefused;
+  rig.cameras[0].mounting_quality->reasons = {"one axis"};
   const auto found = doubts(rig);
-  ASSERT_EQ(found.size(), 3U);
+  ASSERT_EQ(found.size(), 4U);
+  EXPECT_EQ(found[3].block, "cam0.mounting");
+  EXPECT_NE(found[3].text.find("forced); one axis"), std::string::npos) << found[3].text;
   EXPECT_EQ(found[2].block, "cam0.intrinsics");
   EXPECT_NE(found[2].text.find("warning; no tilt"), std::string::npos) << found[2].text;
   EXPECT_EQ(found[0].block, "imu.accelerometer");
