@@ -103,18 +103,24 @@ bool ChainSystem::eliminate_nodes() {
   return true;
 }
 
+bool ChainSystem::reduce(double damping) {
+  solved_ = false;
+  eliminate_inner(damping);
+  reduced_ = inner_positive_ && eliminate_nodes();
+  return reduced_;
+}
+
 bool ChainSystem::reduce() {
-  eliminate_inner(0);
-  return inner_positive_ && eliminate_nodes();
+  return reduce(0);
 }
 
 bool ChainSystem::solve(double damping, ChainStep& step) {
-  eliminate_inner(damping);
-  if (!inner_positive_ || !eliminate_nodes()) return false;
+  if (!reduce(damping)) return false;
   const Index k = layout_.node;
   const Index m = layout_.shared;
   shared_factor_ = shared_;
   if (m > 0 && !blas::cholesky_lower(size_of(m), shared_factor_.data(), size_of(m))) return false;
+  solved_ = true;
   const std::size_t windows = factors_.size();
   // Forwards: L y = -g.
   ChainStep x;
@@ -180,12 +186,14 @@ double ChainSystem::damped_square(const ChainStep& step) const {
 }
 
 MatrixXd ChainSystem::shared_covariance() const {
+  require(solved_, "shared_covariance: the last solve() must have found a solution");
   MatrixXd inverse = MatrixXd::Identity(layout_.shared, layout_.shared);
   solve_lower(shared_factor_, layout_.shared, inverse);
   return inverse.transpose() * inverse;
 }
 
 MatrixXd ChainSystem::shared_pulls(const std::vector<int>& group, int groups) const {
+  require(reduced_, "shared_pulls: the last reduce() or solve() must have succeeded");
   const std::size_t windows = factors_.size();
   require(group.size() == windows, "group", static_cast<double>(group.size()), "must have one number a window");
   const Index k = layout_.node;

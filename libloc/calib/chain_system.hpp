@@ -59,14 +59,16 @@ class ChainSystem {
   double damped_square(const ChainStep& step) const;
   /// @}
 
-  /// Inverse of shared_information(): the covariance of the shared unknowns, in units of the residuals' variance. Of
-  /// the last solve().
+  /// Inverse of shared_information(): the covariance of the shared unknowns, in units of the residuals' variance.
+  /// @throws std::invalid_argument unless the last solve() found a solution.
   Eigen::MatrixXd shared_covariance() const;
   /// What each group of windows alone adds to the gradient of the shared unknowns when the others are eliminated, one
   /// column a group. Of the last reduce() or solve(). @param group of each window, in [0, groups)
+  /// @throws std::invalid_argument unless that succeeded, and for groups that cannot be.
   Eigen::MatrixXd shared_pulls(const std::vector<int>& group, int groups) const;
 
  private:
+  bool reduce(double damping);
   void eliminate_inner(double damping);
   bool eliminate_nodes();
 
@@ -76,6 +78,8 @@ class ChainSystem {
   // Factors. In each window's: L of the inner ones, below it what couples the others to them; the rest is what remains.
   std::vector<Eigen::MatrixXd> factors_;
   bool inner_positive_ = false;
+  bool reduced_ = false;
+  bool solved_ = false;
   std::vector<Eigen::MatrixXd> node_factors_;    // L of each node
   std::vector<Eigen::MatrixXd> node_couplings_;  // of the next node and the shared ones to it: (node + shared) x node
   Eigen::MatrixXd shared_;

@@ -139,15 +139,11 @@ PoseState EulerTrajectory::at(double t_s) const {
 
 EulerTrajectoryFit fit_euler_trajectory(std::span<const double> times_s, std::span<const Pose3> poses,
                                         const SplineFitOptions& options) {
-  if (poses.empty()) throw DataError("no samples");
+  options.check();
+  calib::check_samples(times_s, poses);
   std::vector<Eigen::Quaterniond> rotations;
   rotations.reserve(poses.size());
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    if (!(std::abs(poses[i].rotation.norm() - 1) < 1e-6)) {
-      throw DataError("poses[" + std::to_string(i) + "]: must be finite, with a quaternion of norm 1");
-    }
-    rotations.push_back(poses[i].rotation);
-  }
+  for (const Pose3& pose : poses) rotations.push_back(pose.rotation);
   const Eigen::Quaterniond mean = mean_rotation(rotations);
   Eigen::MatrixXd values(6, static_cast<Eigen::Index>(poses.size()));
   for (std::size_t i = 0; i < poses.size(); ++i) {

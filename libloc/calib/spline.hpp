@@ -121,7 +121,8 @@ struct VectorSplineFit {
 /// Least squares; the grid begins at the first sample and covers the last.
 /// @param times_s increasing  @param values one column for each time
 /// @throws std::invalid_argument for options; DataError naming the index for no samples, other numbers of times and
-/// values, times that do not increase, and what is not finite.
+/// values, times that do not increase, what is not finite, and a span of time (a stamp far too late) for which there
+/// would be more than 20 control points a sample and more than 10^5 in all.
 VectorSplineFit fit_vector_spline(std::span<const double> times_s, const Eigen::MatrixXd& values,
                                   const SplineFitOptions& options = {});
 

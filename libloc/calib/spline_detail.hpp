@@ -28,6 +28,10 @@ RotationState rotation_at(const Eigen::Quaterniond& first, std::span<const Rotat
 RotationState angles_at(const Eigen::Quaterniond& mean, const Eigen::Ref<const Eigen::MatrixXd>& angles,
                         const SplineWeights& weights, RotationJacobians* jacobians);
 
+/// What every fit of poses needs. @throws DataError naming the index: other numbers of times and poses, times that do
+/// not increase, what is not finite, and poses that follow each other by more than 120 degrees.
+void check_samples(std::span<const double> times_s, std::span<const Pose3> poses);
+
 /// Fits over a grid that is given. Rotations need times that cover it, in steps well below the spacing. @{
 Eigen::MatrixXd fit_vectors(const SplineGrid& grid, std::span<const double> times_s, const Eigen::MatrixXd& values,
                             double smoothing);

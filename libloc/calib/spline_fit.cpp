@@ -22,6 +22,10 @@ using Eigen::Vector3d;
 
 constexpr double kLargestTurn = 120 * std::numbers::pi / 180;  // between two samples
 constexpr double kStepTolerance = 1e-11;                       // [rad]
+// Of control points: what a fit of poses has room for in 100 MB, and as many a sample when there are more samples. A
+// grid that is larger than both spans a gap, which only a wrong time can be.
+constexpr double kAlwaysAllowed = 100'000;
+constexpr double kAllowedASample = 20;
 // Second differences of three neighbours.
 constexpr std::array<double, 3> kBend{1, -2, 1};
 
@@ -40,6 +44,19 @@ void check_times(std::span<const double> times_s, std::size_t values) {
 }
 
 SplineGrid grid_of(std::span<const double> times_s, const SplineFitOptions& options) {
+  const double needed = std::ceil((times_s.back() - times_s.front()) / options.spacing_s) + options.order - 1;
+  // False for a span that overflows.
+  if (!(needed <= std::max(kAlwaysAllowed, kAllowedASample * static_cast<double>(times_s.size())))) {
+    std::size_t late = 1;
+    for (std::size_t i = 2; i < times_s.size(); ++i) {
+      if (times_s[i] - times_s[i - 1] > times_s[late] - times_s[late - 1]) late = i;
+    }
+    throw DataError("times_s[" + std::to_string(late) + "] = " + to_text(times_s[late]) + " comes " +
+                    to_text(times_s[late] - times_s[late - 1], 6) + " s after the one before: from " +
+                    to_text(times_s.front()) + " s to " + to_text(times_s.back()) + " s a spacing of " +
+                    to_text(options.spacing_s) + " s needs " + to_text(needed, 10) + " control points for " +
+                    std::to_string(times_s.size()) + " samples");
+  }
   return grid_over(times_s.front(), times_s.back(), options.spacing_s, options.order);
 }
 
@@ -187,6 +204,23 @@ class RotationFit {
 
 namespace calib {
 
+void check_samples(std::span<const double> times_s, std::span<const Pose3> poses) {
+  check_times(times_s, poses.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const std::string name = "poses[" + std::to_string(i) + "]";
+    // False for NaN.
+    if (!(std::abs(poses[i].rotation.norm() - 1) < 1e-6) || !poses[i].translation.allFinite()) {
+      throw DataError(name + ": must be finite, with a quaternion of norm 1");
+    }
+    if (i == 0) continue;
+    const double turn = so3::angle_between(poses[i - 1].rotation, poses[i].rotation);
+    if (turn > kLargestTurn) {
+      throw DataError(name + " is turned by " + to_text(turn, 3) +
+                      " rad against the one before: the way between them is not known");
+    }
+  }
+}
+
 Eigen::MatrixXd fit_vectors(const SplineGrid& grid, std::span<const double> times_s, const Eigen::MatrixXd& values,
                             double smoothing) {
   return fit_columns(grid, times_s, values, smoothing);
@@ -229,22 +263,9 @@ VectorSplineFit fit_vector_spline(std::span<const double> times_s, const Eigen::
 PoseSplineFit fit_pose_spline(std::span<const double> times_s, std::span<const Pose3> poses,
                               const SplineFitOptions& options) {
   options.check();
-  check_times(times_s, poses.size());
+  calib::check_samples(times_s, poses);
   Eigen::MatrixXd positions(3, static_cast<Index>(poses.size()));
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const std::string name = "poses[" + std::to_string(i) + "]";
-    // False for NaN.
-    if (!(std::abs(poses[i].rotation.norm() - 1) < 1e-6) || !poses[i].translation.allFinite()) {
-      throw DataError(name + ": must be finite, with a quaternion of norm 1");
-    }
-    positions.col(static_cast<Index>(i)) = poses[i].translation;
-    if (i == 0) continue;
-    const double turn = so3::angle_between(poses[i - 1].rotation, poses[i].rotation);
-    if (turn > kLargestTurn) {
-      throw DataError(name + " is turned by " + to_text(turn, 3) +
-                      " rad against the one before: the way between them is not known");
-    }
-  }
+  for (std::size_t i = 0; i < poses.size(); ++i) positions.col(static_cast<Index>(i)) = poses[i].translation;
   const SplineGrid grid = grid_of(times_s, options);
   RotationFit fit(grid, times_s, poses, options.smoothing);
   int iterations = 0;

@@ -1,6 +1,7 @@
 #include "libloc/calib/spline_grid.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "libloc/core/check.hpp"
@@ -82,6 +83,7 @@ double abscissa_of(const SplineGrid& grid, int i) {
 }
 
 SplineWeights weights_at(int order, double spacing_s, double u) {
+  assert(order >= 1 && order <= kMaxSplineOrder && spacing_s > 0);
   const Coefficients& c = kCoefficients[static_cast<std::size_t>(order)];
   const auto k = static_cast<std::size_t>(order);
   const double rate = 1 / spacing_s;

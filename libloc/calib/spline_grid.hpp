@@ -53,8 +53,10 @@ struct SplineWeights {
 };
 
 /// B_j, their sum is 1.
+/// @param order in [1, kMaxSplineOrder] @param spacing_s positive. Both as a grid that was checked has them: this is
+/// called for every sample, so they are asserted only.
 SplineWeights weights_at(int order, double spacing_s, double u);
-/// L_j, the first is 1 everywhere.
+/// L_j, the first is 1 everywhere. Parameters likewise.
 SplineWeights cumulative_weights_at(int order, double spacing_s, double u);
 
 }  // namespace loc

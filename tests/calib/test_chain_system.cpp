@@ -130,7 +130,17 @@ TEST(ChainSystem, AnUndeterminedOneIsRefused) {
     }
     ChainStep step;
     EXPECT_FALSE(system.solve(0, step)) << where;
+    EXPECT_THROW(system.shared_covariance(), std::invalid_argument) << where;
+    EXPECT_THROW(system.shared_pulls({0, 0}, 1), std::invalid_argument) << where;
   }
+  ChainSystem fresh(layout);
+  fill(fresh);
+  EXPECT_THROW(fresh.shared_covariance(), std::invalid_argument);
+  EXPECT_THROW(fresh.shared_pulls({0, 0}, 1), std::invalid_argument);
+  ChainStep step;
+  ASSERT_TRUE(fresh.solve(0, step));
+  EXPECT_NO_THROW(fresh.shared_covariance());
+  EXPECT_THROW(fresh.shared_pulls({0, 1}, 1), std::invalid_argument);
   EXPECT_THROW(ChainSystem({{}, 2, 2}), std::invalid_argument);
   EXPECT_THROW(ChainSystem({{2}, -1, 2}), std::invalid_argument);
 }

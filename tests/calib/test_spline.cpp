@@ -256,12 +256,36 @@ TEST(SplineFit, OneSampleAndFewSamplesAreFine) {
   }
 }
 
+// A fit over 10^6 s would ask for gigabytes.
+TEST(SplineFit, AStampFarTooLateIsNamed) {
+  Samples samples = samples_of(waved, 1);
+  samples.times[60] += 0.005;  // a small gap
+  const Eigen::MatrixXd values = Eigen::MatrixXd::Zero(2, 100);
+  for (std::size_t i = 98; i < 100; ++i) samples.times[i] += 1e6;
+  const std::vector<std::string> parts{"times_s[98] = 1000000.98", "1e+06 s after",           "from 0 s",
+                                       "spacing of 0.1 s",         "10000013 control points", "100 samples"};
+  expect_data_error([&] { fit_vector_spline(samples.times, values); }, parts);
+  expect_data_error([&] { fit_pose_spline(samples.times, samples.poses); }, parts);
+  expect_data_error([&] { fit_euler_trajectory(samples.times, samples.poses); }, parts);
+  samples.times[0] = -1.7e308;
+  samples.times[99] = 1.7e308;
+  expect_data_error([&] { fit_vector_spline(samples.times, values); }, {"inf control points"});
+}
+
+TEST(SplineFit, ManySamplesMayTakeLong) {
+  std::vector<double> times;
+  for (int i = 0; i < 5100; ++i) times.push_back(2.0 * i);
+  const Eigen::MatrixXd values = Eigen::MatrixXd::Ones(1, 5100);
+  EXPECT_LT(fit_vector_spline(times, values).rms, 1e-6);  // 101,983 control points
+}
+
 TEST(SplineFit, BadInputIsNamed) {
   const Samples good = samples_of(waved, 1);
   const auto refused = [&](const auto& change, const std::vector<std::string>& parts) {
     Samples bad = good;
     change(bad);
     expect_data_error([&] { fit_pose_spline(bad.times, bad.poses); }, parts);
+    expect_data_error([&] { fit_euler_trajectory(bad.times, bad.poses); }, parts);
   };
   refused(
       [](Samples& s) {
