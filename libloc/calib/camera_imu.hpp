@@ -27,6 +27,7 @@
 #include <string>
 #include <vector>
 
+#include "libloc/calib/camera_recording.hpp"
 #include "libloc/core/named_count.hpp"
 #include "libloc/core/quality.hpp"
 #include "libloc/core/time.hpp"
@@ -43,12 +44,6 @@ enum class RotationForm : std::uint8_t {
   kCumulative,   ///< calib/spline: no attitude is special
   kThreeAngles,  ///< calib/euler_trajectory, with the mean attitude taken out: the source's, for motion about one
                  ///< attitude
-};
-
-/// What one camera of the rig has seen.
-struct CameraRecording {
-  CameraCalibration camera;       ///< intrinsics, with their deviations when it has them; its pose plays no part
-  std::vector<TargetView> views;  ///< pictures with their times on the camera's clock
 };
 
 /// Correlation of the turn rates at every offset that was tried.

@@ -1,7 +1,7 @@
 // Looks at a recording for camera-IMU calibration before anything is solved, and says in plain words what is wrong with
 // it: units, rates, gaps, times, saturation, clocks, the target in the pictures, the noise that is assumed.
-// From: what calibrate_camera_imu() takes; IMU samples may be raw or calibrated (but saturation shows in raw ones only).
-// To: findings, each with a code that stays, and a sentence with the figures and what to do about it.
+// From: what calibrate_camera_imu() takes; IMU samples may be raw or calibrated (but saturation shows in raw ones
+// only). To: findings, each with a code that stays, and a sentence with the figures and what to do about it.
 //
 // It does not judge the motion (that is the calibration's part) and needs no common clock. Nothing is skipped here: a
 // sample that the calibration would skip is counted once, under its reason. The size of the turn rates is compared with
