@@ -134,8 +134,8 @@ TEST(ChainSystem, AnUndeterminedOneIsRefused) {
     // A shared unknown is left over by the elimination: what pulls at it can still be told.
     EXPECT_EQ(system.reduce(), where == 2) << where;
     if (where == 2) {
-      EXPECT_EQ(system.shared_information()(0, 0), 0);
-      EXPECT_EQ(system.shared_pulls({0, 0}, 1)(0, 0), 0);
+      EXPECT_EQ(system.shared_information()(1, 1), 0);
+      EXPECT_EQ(system.shared_pulls({0, 0}, 1)(1, 0), 0);
     } else {
       EXPECT_THROW(system.shared_pulls({0, 0}, 1), std::invalid_argument) << where;
     }
