@@ -20,7 +20,9 @@ constexpr double kAlikePeaks = 0.9;
 constexpr double kDoubtfulNoise = 3;
 constexpr double kPulledApart = 2;
 constexpr double kByChance = 2;           // deviations
-constexpr double kSignificant = 5;        // deviations from which what was held is something else
+// Deviations from which what was held is something else. What was held wrongly also pulls pieces of the recording apart,
+// so the deviations have grown with it.
+constexpr double kSignificant = 2.5;
 constexpr double kRollingShutter = 1e-3;  // [s] from the first row to the last
 constexpr double kDrift = 1e-4;           // [s] over the recording
 constexpr double kIntrinsicsPull = 1;     // [px]

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "libloc/calib/camera_imu.hpp"
+#include "libloc/calib/camera_imu_knots.hpp"
 #include "libloc/calib/camera_imu_problem.hpp"
 #include "libloc/core/random.hpp"
 #include "libloc/core/statistics.hpp"
@@ -374,6 +376,211 @@ TEST(CameraImu, TellsWhatItSaw) {
   EXPECT_EQ(stopped.stopped, "interrupted");
   EXPECT_EQ(stopped.quality.verdict, Verdict::kRefused);
   EXPECT_TRUE(near(stopped.cameras[0].T_camera_imu.translation, fit.cameras[0].T_camera_imu.translation, 0.01));
+}
+
+// ---- more unknowns
+
+// By deviations: each error over what was said of it.
+Vector7d in_sigmas(const Vector7d& error, const CameraImuCamera& camera) {
+  return error.cwiseQuotient(camera.sigma);
+}
+
+TEST(CameraImu, BothRotationFormsAgree) {
+  const WavedRig rig = wave({.seconds = 15}, 8);
+  const CameraImuFit cumulative = calibrate(rig);
+  const CameraImuFit angles = calibrate(rig, {.rotation = RotationForm::kThreeAngles});
+  EXPECT_TRUE(angles.converged);
+  const Vector7d apart = in_sigmas(error_of(cumulative, rig, 0) - error_of(angles, rig, 0), cumulative.cameras[0]);
+  EXPECT_LT(apart.norm(), 0.05);
+  EXPECT_NEAR(angles.gyroscope_chi, cumulative.gyroscope_chi, 1e-3);
+  // Close to a quarter of a turn from the mean is more than three angles can say.
+  WavedRigOptions wide{.seconds = 15};
+  wide.turning = {1, 6, 1};
+  const WavedRig turned = wave(wide, 8);
+  expect_data_error([&] { calibrate(turned, {.rotation = RotationForm::kThreeAngles}); },
+                    {"too wide a motion for three angles", "cumulative"});
+}
+
+TEST(CameraImu, TwoCameras) {
+  const WavedRig rig = wave({.seconds = 20, .time_offset_s = 0.05, .second_camera = true}, 5);
+  const std::array recordings{CameraRecording{rig.camera, rig.views}, CameraRecording{rig.second, rig.second_views}};
+  const CameraImuFit both = calibrate_camera_imu(rig.target, recordings, rig.imu, ImuNoise{});
+  const CameraImuFit alone = calibrate(rig);
+  EXPECT_TRUE(both.converged);
+  ASSERT_EQ(both.cameras.size(), 2U);
+  EXPECT_EQ(both.cameras[1].camera.name, "cam1");
+  const Vector7d first = error_of(both, rig, 0.05);
+  Vector7d second;
+  second << so3::boxminus(rig.T_second_imu.rotation, both.cameras[1].T_camera_imu.rotation),
+      rig.T_second_imu.translation - both.cameras[1].T_camera_imu.translation,
+      0.05 + test::kSecondOffset - both.cameras[1].time_offset_s;
+  EXPECT_LT(in_sigmas(first, both.cameras[0]).cwiseAbs().maxCoeff(), 3.5);
+  EXPECT_LT(in_sigmas(second, both.cameras[1]).cwiseAbs().maxCoeff(), 3.5);
+  EXPECT_LT(both.cameras[0].sigma_by_noise.norm(), alone.cameras[0].sigma_by_noise.norm());
+  // The rig as it is written.
+  EXPECT_TRUE(near(both.cameras[1].camera.T_body_camera.translation, rig.T_second_imu.inverse().translation, 2e-3));
+  EXPECT_EQ(both.cameras[1].camera.time_offset_s, both.cameras[1].time_offset_s);
+}
+
+TEST(CameraImu, RollingShutterIsToldAndEstimated) {
+  const double delay = 3e-5;  // 14 ms from the first row to the last
+  const WavedRig rig = wave({.seconds = 15, .line_delay_s = delay}, 6);
+  const CameraImuFit held = calibrate(rig);
+  const CameraImuCamera& told = held.cameras[0];
+  EXPECT_FALSE(told.line_delay_s.estimated);
+  EXPECT_NEAR(told.line_delay_s.value, delay, 0.5 * delay);  // one step only
+  EXPECT_GE(held.quality.verdict, Verdict::kWarn);
+  EXPECT_TRUE(std::ranges::any_of(held.quality.reasons,
+                                  [](const std::string& r) { return r.find("rolling shutter") != std::string::npos; }));
+  const CameraImuFit fit = calibrate(rig, {.estimate_line_delay = true});
+  const CameraImuCheck& line = fit.cameras[0].line_delay_s;
+  EXPECT_TRUE(line.estimated);
+  EXPECT_NEAR(line.value, delay, 4 * line.sigma);
+  EXPECT_LT(line.sigma, 0.02 * delay);
+  EXPECT_LT(in_sigmas(error_of(fit, rig, 0), fit.cameras[0]).cwiseAbs().maxCoeff(), 4);
+  EXPECT_EQ(fit.quality.verdict, Verdict::kOk) << fit.quality.reasons.front();
+}
+
+TEST(CameraImu, DriftOfTheClocksIsToldAndEstimated) {
+  const double drift = 5e-5;
+  const WavedRig rig = wave({.seconds = 20, .drift = drift}, 6);
+  const CameraImuFit held = calibrate(rig);
+  const CameraImuCheck& told = held.cameras[0].offset_drift;
+  EXPECT_FALSE(told.estimated);
+  EXPECT_NEAR(told.value, drift, 5 * told.sigma);
+  EXPECT_EQ(held.quality.verdict, Verdict::kWarn);
+  const CameraImuFit fit = calibrate(rig, {.estimate_drift = true});
+  EXPECT_NEAR(fit.cameras[0].offset_drift.value, drift, 4 * fit.cameras[0].offset_drift.sigma);
+  EXPECT_LT(in_sigmas(error_of(fit, rig, 0), fit.cameras[0]).cwiseAbs().maxCoeff(), 4);
+  EXPECT_EQ(fit.quality.verdict, Verdict::kOk) << fit.quality.reasons.front();
+}
+
+TEST(CameraImu, IntrinsicsTakePart) {
+  WavedRig rig = wave({.seconds = 15}, 7);
+  const CameraCalibration truth = rig.camera;
+  rig.camera.intrinsics_px += Eigen::Vector4d(1.5, 1.2, -1.4, 1.3);
+  rig.camera.intrinsics_quality->intrinsics_sigma_px.setConstant(1.5);
+  rig.camera.intrinsics_quality->distortion_sigma.setConstant(1e-4);
+  // Held: wrong by more than noise can, and the deviations say so.
+  const CameraImuFit held = calibrate(rig);
+  const Vector7d error = error_of(held, rig, 0);
+  EXPECT_GT(error.cwiseQuotient(held.cameras[0].sigma_by_noise).norm(), 10);
+  EXPECT_LT(in_sigmas(error, held.cameras[0]).cwiseAbs().maxCoeff(), 3);
+  EXPECT_GT(held.cameras[0].sigma_by_intrinsics.norm(), 5 * held.cameras[0].sigma_by_noise.norm());
+  // What the mounting moves by is what by_intrinsics says.
+  rig.camera.intrinsics_px[2] += 0.5;
+  const CameraImuFit moved = calibrate(rig);
+  const Vector7d by_cx = 0.5 * held.cameras[0].by_intrinsics.col(2);
+  EXPECT_LT((error - error_of(moved, rig, 0) - by_cx).norm(), 0.1 * by_cx.norm());
+  rig.camera.intrinsics_px[2] -= 0.5;
+  // Refined: found.
+  const CameraImuFit fit = calibrate(rig, {.refine_intrinsics = true});
+  const CameraImuCamera& camera = fit.cameras[0];
+  EXPECT_TRUE(fit.converged);
+  const Eigen::Vector4d left =
+      (truth.intrinsics_px - camera.camera.intrinsics_px).cwiseQuotient(camera.intrinsics_sigma.head<4>());
+  EXPECT_LT(left.cwiseAbs().maxCoeff(), 4);
+  EXPECT_LT(camera.intrinsics_sigma.head<4>().maxCoeff(), 0.8);
+  EXPECT_TRUE(near(camera.intrinsics_change.head<4>(), -Eigen::Vector4d(1.5, 1.2, -1.4, 1.3), 1.0));
+  EXPECT_LT(in_sigmas(error_of(fit, rig, 0), camera).cwiseAbs().maxCoeff(), 4);
+  // Where nobody measured them, something is taken to be.
+  rig.camera.intrinsics_quality.reset();
+  EXPECT_NEAR(calibrate(rig).cameras[0].intrinsics_sigma[0], 0.23, 0.02);
+}
+
+TEST(CameraImu, MatricesOfTheImuAndGravityAreFound) {
+  WavedRigOptions options{.seconds = 20};
+  options.gyroscope_matrix << 1.01, 0.003, -0.002, 0.004, 0.99, 0.001, -0.003, 0.002, 1.005;
+  options.accelerometer_matrix << 1.008, 0, 0, 0.004, 0.995, 0, -0.003, 0.002, 1.004;
+  const WavedRig rig = wave(options, 3);
+  const CameraImuFit fit = calibrate(rig, {.estimate_imu_matrices = true});
+  EXPECT_TRUE(fit.converged);
+  const auto off = [](const Eigen::Matrix3d& found, const Eigen::Matrix3d& truth, const Eigen::Matrix3d& sigma) {
+    double most = 0;
+    for (int i = 0; i < 9; ++i) {
+      if (sigma(i) > 0) most = std::max(most, std::abs(found(i) - truth(i)) / sigma(i));
+    }
+    return most;
+  };
+  EXPECT_LT(off(fit.gyroscope_matrix, options.gyroscope_matrix, fit.gyroscope_matrix_sigma), 4);
+  EXPECT_LT(off(fit.accelerometer_matrix, options.accelerometer_matrix, fit.accelerometer_matrix_sigma), 4);
+  EXPECT_LT(fit.gyroscope_matrix_sigma.maxCoeff(), 2e-3);
+  EXPECT_LT(in_sigmas(error_of(fit, rig, 0), fit.cameras[0]).cwiseAbs().maxCoeff(), 4);
+  // Gravity's size: looked at where it is held, found where it is asked for.
+  const WavedRig plain = wave({.seconds = 20}, 3);
+  const CameraImuFit wrong = calibrate(plain, {.gravity = 9.75});
+  EXPECT_NEAR(wrong.gravity_size.value, 9.80665, 5 * wrong.gravity_size.sigma);
+  EXPECT_LT(wrong.gravity_size.sigma, 0.02);
+  const CameraImuFit found = calibrate(plain, {.gravity = 9.75, .estimate_gravity = true});
+  EXPECT_NEAR(found.gravity_size.value, 9.80665, 4 * found.gravity_size.sigma);
+  EXPECT_NEAR(found.gravity_target.norm(), found.gravity_size.value, 1e-9);
+}
+
+// ---- input that is not as it should be
+
+TEST(CameraImu, ABoardWithoutDirectionKeepsItsNumbers) {
+  const WavedRig rig = wave({.seconds = 12, .target = "checkerboard 8x6 0.045", .half_turns = true}, 2);
+  ASSERT_FALSE(rig.target.has_direction());
+  const CameraImuFit fit = calibrate(rig);
+  EXPECT_TRUE(fit.converged);
+  EXPECT_LT(in_sigmas(error_of(fit, rig, 0), fit.cameras[0]).cwiseAbs().maxCoeff(), 4);
+  EXPECT_TRUE(std::ranges::all_of(fit.cameras[0].views, &CameraImuView::used));
+  // Over a gap the gyroscope tells which end is which.
+  WavedRig gap = rig;
+  gap.views.erase(gap.views.begin() + 80, gap.views.begin() + 121);  // of both kinds
+  EXPECT_LT(in_sigmas(error_of(calibrate(gap), rig, 0), fit.cameras[0]).cwiseAbs().maxCoeff(), 6);
+}
+
+TEST(CameraImu, SamplesAndPicturesThatCannotBeUsedAreCounted) {
+  WavedRig rig = wave({.seconds = 12}, 2);
+  const CameraImuFit clean = calibrate(rig);
+  std::swap(rig.views[40], rig.views[60]);        // out of order: no harm
+  rig.views[70].time_ns = rig.views[71].time_ns;  // twice
+  rig.views[90].time_ns = kNoTime;
+  rig.imu.insert(rig.imu.begin() + 500, rig.imu[499]);  // twice
+  rig.imu.insert(rig.imu.begin() + 800, rig.imu[300]);  // steps back
+  rig.imu[1000].specific_force.x() = std::nan("");
+  const CameraImuFit fit = calibrate(rig);
+  const auto count = [&](const std::string& name) {
+    const auto at = std::ranges::find(fit.counts, name, &NamedCount::name);
+    return at == fit.counts.end() ? -1 : at->value;
+  };
+  EXPECT_EQ(count("imu.skipped.not_finite"), 1);
+  EXPECT_EQ(count("imu.skipped.time_not_later"), 2);
+  EXPECT_EQ(count("imu.used"), static_cast<std::int64_t>(fit.imu_time_ns.size()));
+  EXPECT_EQ(fit.cameras[0].views[71].reason, "its time is that of another picture");
+  EXPECT_EQ(fit.cameras[0].views[90].reason, "it has no time");
+  EXPECT_TRUE(fit.cameras[0].views[40].used);
+  EXPECT_LT(in_sigmas(error_of(fit, rig, 0) - error_of(clean, rig, 0), clean.cameras[0]).norm(), 1);
+  // Readings in degrees: the camera knows better.
+  for (ImuMeasurement& m : rig.imu) m.angular_velocity *= 180 / std::numbers::pi;
+  expect_data_error([&] { calibrate(rig); }, {"times as fast as the camera", "deg/s"});
+}
+
+TEST(CameraImu, KnotsFollowTheSpectrum) {
+  const auto knots = [](double speed, double imu_hz, int order, double camera_hz = 20) {
+    const WavedRig rig = wave({.seconds = 20, .imu_hz = imu_hz, .camera_hz = camera_hz, .speed = speed}, 1);
+    std::vector<calib::ImuRow> imu;
+    for (const ImuMeasurement& m : rig.imu) {
+      imu.push_back({to_seconds(m.time_ns - rig.imu[0].time_ns), m.angular_velocity, m.specific_force});
+    }
+    return calib::choose_knots(imu, order, 0, 1 / camera_hz);
+  };
+  const calib::KnotChoice slow = knots(1, 200, 6);
+  EXPECT_EQ(slow.spacing_s, 0.02);
+  EXPECT_NEAR(slow.bandwidth_hz, 3, 1.5);  // the motion reaches 1.3 Hz
+  EXPECT_FALSE(slow.too_fast);
+  const calib::KnotChoice fast = knots(10, 200, 6);
+  EXPECT_GT(fast.bandwidth_hz, 11);
+  EXPECT_LT(fast.bandwidth_hz, 22);
+  EXPECT_NEAR(fast.spacing_s * 5 * fast.bandwidth_hz, 1, 0.08);
+  EXPECT_LT(knots(10, 200, 4).spacing_s, fast.spacing_s);
+  EXPECT_TRUE(knots(25, 200, 6).too_fast);
+  EXPECT_NEAR(knots(1, 100, 6).spacing_s, 0.04, 1e-9);
+  // 40 ms and 25 pictures a second keep step.
+  const calib::KnotChoice step = knots(1, 100, 6, 25);
+  EXPECT_LT(step.spacing_s, 0.038);
+  EXPECT_NE(step.reason.find("keep step"), std::string::npos);
 }
 
 TEST(CameraImu, WhatCannotBeSaysWhy) {
