@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
+#include <utility>
 
 #include "libloc/calib/least_squares.hpp"
 #include "libloc/core/check.hpp"
@@ -23,6 +25,8 @@ using Eigen::Vector3d;
 constexpr double kShortestStep = 0.15;
 constexpr double kLongestStep = 0.4;
 constexpr double kLeastCorrelation = 0.5;
+constexpr double kDoubtfulShare = 0.7;  // of the least correlation, for another peak to be looked at
+constexpr std::size_t kPeaks = 6;
 constexpr double kMostUnexplained = 0.5;  // of the variance of the turn rates
 constexpr double kSecondApart = 0.3;      // [s] from the peak, to count as another one
 constexpr double kLeastOverlap = 0.5;     // of the pictures, or of what the shorter recording allows
@@ -79,13 +83,27 @@ struct PairSums {
 struct Peak {
   double offset_s = 0;
   double correlation = -1;
-  double second = -1;
-  OffsetCurve curve;
 };
+
+// The highest ones, not two of one hill.
+std::vector<Peak> peaks_of(const OffsetCurve& curve) {
+  std::vector<std::size_t> order(curve.offset_s.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, std::ranges::greater{}, [&](std::size_t i) { return curve.correlation[i]; });
+  std::vector<Peak> out;
+  for (const std::size_t i : order) {
+    if (out.size() == kPeaks) break;
+    const double d = curve.offset_s[i];
+    if (std::ranges::all_of(out, [&](const Peak& p) { return std::abs(p.offset_s - d) > kSecondApart; })) {
+      out.push_back({d, curve.correlation[i]});
+    }
+  }
+  return out;
+}
 
 // Norms of the turn rates know nothing of the rotation between the sensors; all offsets are tried at which half of the
 // pictures (or of the shorter recording) have IMU samples.
-Peak correlate(const std::vector<Turn>& turns, const MeanRate& gyro, double low_s, double high_s) {
+OffsetCurve correlate(const std::vector<Turn>& turns, const MeanRate& gyro, double low_s, double high_s) {
   std::vector<double> lengths;
   for (const Turn& turn : turns) lengths.push_back(turn.to_s - turn.from_s);
   const double step = quantile(lengths, 0.5);
@@ -98,7 +116,7 @@ Peak correlate(const std::vector<Turn>& turns, const MeanRate& gyro, double low_
   const double seen = turns.back().to_s - turns.front().from_s;
   const double possible = std::min(1.0, (gyro.end_s() - gyro.begin_s()) / seen);
   const double needed = std::max<double>(kLeastSteps, kLeastOverlap * possible * static_cast<double>(turns.size()));
-  Peak peak;
+  OffsetCurve out;
   for (double d = low_s; d <= high_s; d += h) {
     PairSums sums;
     for (const Turn& turn : turns) {
@@ -107,19 +125,10 @@ Peak correlate(const std::vector<Turn>& turns, const MeanRate& gyro, double low_
       sums.add(turn.rate.norm(), norms[static_cast<std::size_t>(std::lround(std::max(at, 0.0)))]);
     }
     if (sums.n < needed) continue;
-    peak.curve.offset_s.push_back(d);
-    peak.curve.correlation.push_back(sums.correlation());
-    if (peak.curve.correlation.back() > peak.correlation) {
-      peak.correlation = peak.curve.correlation.back();
-      peak.offset_s = d;
-    }
+    out.offset_s.push_back(d);
+    out.correlation.push_back(sums.correlation());
   }
-  for (std::size_t i = 0; i < peak.curve.offset_s.size(); ++i) {
-    if (std::abs(peak.curve.offset_s[i] - peak.offset_s) > kSecondApart) {
-      peak.second = std::max(peak.second, peak.curve.correlation[i]);
-    }
-  }
-  return peak;
+  return out;
 }
 
 // rate in camera = R (rate of the gyroscope - bias), least squares with weights.
@@ -129,6 +138,7 @@ struct Wahba {
   double cost = 0;                     // mean square of the residuals, weighted
   double camera_square = 0;            // mean square of the camera's rates about their mean
   Matrix3d spread = Matrix3d::Zero();  // of the gyroscope's rates
+  double scatter = 0;                  // robust deviation of the residuals, before the last weights
 };
 
 Wahba solve_wahba(const std::vector<Turn>& turns, const MeanRate& gyro, double offset_s, std::vector<double>& weights,
@@ -183,7 +193,8 @@ Wahba solve_wahba(const std::vector<Turn>& turns, const MeanRate& gyro, double o
     }
     out.cost = cost / sum;
     if (!reweight) break;
-    const double scale = std::max(robust_sigma(norms), 1e-9);
+    out.scatter = robust_sigma(norms);
+    const double scale = std::max(out.scatter, 1e-9);
     std::size_t k = 0;
     for (std::size_t i = 0; i < n; ++i) {
       if (covered[i]) weights[i] = tukey_weight(norms[k++] / scale);
@@ -245,19 +256,35 @@ StartResult find_start(std::span<const CameraPoseSample> poses, std::span<const 
     low = *given_offset_s - 0.5;
     high = *given_offset_s + 0.5;
   }
-  const Peak peak = correlate(turns, gyro, low, high);
   CameraImuStart out;
-  out.correlation = peak.correlation;
-  out.second_correlation = peak.second;
-  out.curve = peak.curve;
-  if (peak.correlation < kLeastCorrelation) {
+  out.curve = correlate(turns, gyro, low, high);
+  const std::vector<Peak> peaks = peaks_of(out.curve);
+  // Which of them it is, the rates as vectors tell: poses that are wrong spoil the sums of a correlation.
+  std::vector<double> weights;
+  Wahba wahba;
+  Peak peak;
+  for (const Peak& candidate : peaks) {
+    if (candidate.correlation < kLeastCorrelation * (peak.correlation < 0 ? 1 : kDoubtfulShare)) break;
+    std::vector<double> own(turns.size(), 1.0);
+    const Wahba here = solve_wahba(turns, gyro, candidate.offset_s, own, true);
+    const auto misfit = [](const Wahba& w) { return w.scatter * w.scatter / std::max(w.spread.trace(), 1e-300); };
+    if (peak.correlation >= 0 && !(misfit(here) < misfit(wahba))) continue;
+    peak = candidate;
+    wahba = here;
+    weights = std::move(own);
+  }
+  if (peak.correlation < 0) {
     return {{},
             "Camera and gyroscope do not turn alike at any offset of their clocks (correlation " +
-                to_text(std::max(peak.correlation, 0.0), 2) + ", " + to_text(kLeastCorrelation) +
+                to_text(peaks.empty() ? 0 : std::max(peaks.front().correlation, 0.0), 2) + ", " +
+                to_text(kLeastCorrelation) +
                 " is needed): are both recordings of the same motion, and does the rig turn?"};
   }
-  std::vector<double> weights(turns.size(), 1.0);
-  Wahba wahba = solve_wahba(turns, gyro, peak.offset_s, weights, true);
+  out.correlation = peak.correlation;
+  out.second_correlation = -1;
+  for (const Peak& other : peaks) {
+    if (other.offset_s != peak.offset_s) out.second_correlation = std::max(out.second_correlation, other.correlation);
+  }
   // Golden section around the peak, with the weights that it gave.
   const auto cost = [&](double d) { return solve_wahba(turns, gyro, d, weights, false).cost; };
   const double reach = turns.front().to_s - turns.front().from_s;
