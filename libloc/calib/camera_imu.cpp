@@ -477,10 +477,10 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
   const calib::SharedChoice choice{options.refine_intrinsics, options.estimate_line_delay, options.estimate_drift,
                                    options.estimate_gravity, options.estimate_imu_matrices};
   const SharedLayout shared = calib::shared_layout(state.cameras, choice);
-  Solver solver(problem, shared, options, fit);
-  fit.cost = solver.run(state);
-  if (options.adapt_noise) {
-    for (int round = 0; round < kNoiseRounds && fit.stopped.empty(); ++round) {
+  {  // its matrices are large, and others of that size follow
+    Solver solver(problem, shared, options, fit);
+    fit.cost = solver.run(state);
+    for (int round = 0; options.adapt_noise && round < kNoiseRounds && fit.stopped.empty(); ++round) {
       adapt_noise(problem, state, dt, fit);
       fit.cost = solver.run(state);
     }
