@@ -242,9 +242,9 @@ void look_at_both(const ImuLook& imu, std::span<const CameraRecording> cameras, 
     const double shared = shared_of(imu, look).length();
     if (shared <= 0) {
       const double apart = apart_s(look.first_ns, imu.first_ns);
-      const std::string distance = fixed(std::abs(apart), 1) + (apart > 0 ? " s after" : " s before");
       out.push_back({Verdict::kOk, "clocks.apart",
-                     name + ": its pictures begin " + distance +
+                     name + ": its pictures begin " + fixed(std::abs(apart), 1) + " s " +
+                         (apart > 0 ? "after" : "before") +
                          " the IMU's first sample and share no time with it: the clocks differ, and the offset will "
                          "be found from the motion."});
     } else if (shared < kLeastShared * length) {

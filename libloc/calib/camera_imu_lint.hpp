@@ -34,7 +34,7 @@ struct CameraImuFinding {
   std::string text;  ///< one sentence or two; of a camera's: begins with its name
 };
 
-/// The worst come first, otherwise in the order of the codes above. Empty: nothing to be said.
+/// The worst come first. Empty: nothing to be said.
 /// @param imu_rate_hz nominal; 0 when unknown
 /// @throws std::invalid_argument for what no recording can have: a target, camera or noise that check() refuses, a
 /// corner that the target has not, a rate below zero.

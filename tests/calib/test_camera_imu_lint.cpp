@@ -306,7 +306,21 @@ TEST(CameraImuLint, TheTargetInThePictures) {
               {"no pose explains", "checkerboard 11x6"});
   // A lens that is nearly right.
   expect_only([](Input& in) { in.cameras[0].camera.intrinsics_px[1] *= 1.2; }, Verdict::kWarn, "camera.lens",
-              {"px rms to the corners", "intrinsics and target"});
+              {"px between corner and projection", "do intrinsics and target"});
+  expect_only([](Input& in) { in.cameras[0].camera.distortion[0] += 0.3; }, Verdict::kFair, "camera.lens",
+              {"leave 1."});
+  // Corners that hardly have to do with the board.
+  Random random(6);
+  expect_only(
+      [&](Input& in) {
+        for (TargetView& view : views(in)) {
+          for (TargetCorner& c : view.corners) {
+            c.pixel_px += 25 * Eigen::Vector2d(random.normal(), random.normal());
+            c.pixel_px = c.pixel_px.cwiseMax(0).cwiseMin(Eigen::Vector2d(751, 479));
+          }
+        }
+      },
+      Verdict::kRefused, "camera.lens", {"px"});
   // In millimetres.
   expect_only([](Input& in) { in.target.size_m = 40; }, Verdict::kWarn, "target.size", {"40 m?", "m away"});
 }
