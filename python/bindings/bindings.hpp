@@ -9,7 +9,7 @@ void bind_core(pybind11::module_& m);
 void bind_calib_inertial(pybind11::module_& m);
 void bind_camera(pybind11::module_& m);
 void bind_camera_calibration(pybind11::module_& m);
-void bind_camera_imu_lint(pybind11::module_& m);
+void bind_camera_imu(pybind11::module_& m);
 void bind_spline(pybind11::module_& m);
 void bind_vision(pybind11::module_& m);
 void bind_geo_export(pybind11::module_& m);

@@ -23,7 +23,7 @@ PYBIND11_MODULE(_core, m) {
   locpy::bind_motion(m);
   locpy::bind_camera(m);
   locpy::bind_camera_calibration(m);
-  locpy::bind_camera_imu_lint(m);
+  locpy::bind_camera_imu(m);
   locpy::bind_spline(m);
   locpy::bind_vision(m);
   locpy::bind_slam_options(m);

@@ -9,7 +9,7 @@ import numpy.typing
 import os
 import typing
 from . import so3
-__all__: list[str] = ['AbsoluteError', 'AccelerometerFit', 'AccelerometerOptions', 'Alignment', 'AllanFit', 'AllanOptions', 'AllanTerm', 'AnchoredRun', 'Association', 'CalibrationTarget', 'Camera', 'CameraCalibration', 'CameraFit', 'CameraFitOptions', 'CameraFitView', 'CameraModel', 'CameraRun', 'CarMotion', 'CircleMotion', 'ClockCalibration', 'ClockCalibrationResult', 'ClockChain', 'ClockLine', 'ClockModel', 'Consistency', 'CounterUnwrapper', 'DataError', 'DiscreteImuNoise', 'DistortionModel', 'ESTIMATE_CHANNEL', 'EllipsoidAdvice', 'EllipsoidCollector', 'EllipsoidFit', 'EllipsoidOptions', 'EqvioSource', 'ErrorStateFilter', 'ErrorStateOptions', 'ErrorStateRun', 'ErrorStatistics', 'Estimate', 'EstimateStatus', 'EstimateValid', 'FUSION_CHANNEL', 'FeatureTracker', 'FeatureTrackerOptions', 'FeatureTrackerTimes', 'FeatureVideo', 'FeaturesArrays', 'FeaturesMeasurement', 'FigureEightMotion', 'FusionOutcome', 'FusionPreset', 'FusionPresetSensors', 'FusionResult', 'FusionStartOptions', 'GPS_CHANNEL', 'GpsArrays', 'GpsCalibration', 'GpsClock', 'GpsFixType', 'GpsMeasurement', 'GpsModel', 'GyroscopeFit', 'GyroscopeOptions', 'HAS_VISION', 'HandHeldMotion', 'IMAGE_CHANNEL', 'IMU_CHANNEL', 'ImageMeasurement', 'ImageSlam', 'ImuAllan', 'ImuArrays', 'ImuCalibration', 'ImuIntegration', 'ImuMeasurement', 'ImuModel', 'ImuNoise', 'ImuNoiseFit', 'ImuSampleModel', 'ImuSampling', 'InertialSlam', 'InertialTriadModel', 'IntrinsicsQuality', 'InverseDepthPoint', 'KnownLandmark', 'LcmLogReader', 'LocalFrame', 'LookAtMotion', 'MAGNETOMETER_CHANNEL', 'MadgwickFilter', 'MadgwickOptions', 'MadgwickResult', 'MagnetometerAlignment', 'MagnetometerAlignmentOptions', 'MagnetometerArrays', 'MagnetometerCalibration', 'MagnetometerMeasurement', 'MagnetometerModel', 'MapAnchorOptions', 'MeasurementSource', 'MonoSlam', 'Motion', 'MotionArrays', 'MountedMotion', 'NO_TIME', 'NmeaFixes', 'ODOMETRY_CHANNEL', 'OdometryArrays', 'OdometryMeasurement', 'OrientationError', 'PedestrianMotion', 'Pose3', 'PredictOutcome', 'Quality', 'REFERENCE_CHANNEL', 'Random', 'Recording', 'ReferenceArrays', 'ReferenceMeasurement', 'RelativeError', 'RestFirstMotion', 'RestMotion', 'RestNoise', 'Rig', 'SOURCE_STATUS_CHANNEL', 'STATISTICS_CHANNEL', 'Scenario', 'ScenarioStreams', 'Scene', 'SceneRenderer', 'SimulatedRun', 'Simulation', 'SlamAssociationOptions', 'SlamConsistency', 'SlamCounts', 'SlamFeatureArrays', 'SlamFeatureState', 'SlamFile', 'SlamFrame', 'SlamLandmarkArrays', 'SlamMapArrays', 'SlamMapOptions', 'SlamMotion', 'SlamOptions', 'SlamPrecision', 'SlamPredictionArrays', 'SlamRun', 'SlamSnapshot', 'SlamStartOptions', 'StandStillOptions', 'StillSegment', 'Stillness', 'StillnessDetector', 'StillnessOptions', 'StreamClockModel', 'StreetModel', 'TRACKS_CHANNEL', 'TargetDetection', 'TargetDetector', 'TargetView', 'TimeOffsetResult', 'TrackArrays', 'TrackOrigin', 'Trajectory', 'TriadCalibration', 'TriadQuality', 'TruthArrays', 'Verdict', 'VisualOdometryModel', 'WaypointMotion', 'absolute_error', 'align_magnetometer', 'align_points', 'aligned', 'allan_fit', 'analyse_imu_noise', 'anchor_run', 'april_grid', 'associate', 'average_consistency', 'beta_from_gyro', 'box_room', 'calibrate_camera', 'calibrate_clock', 'checkerboard', 'chi_square_cdf', 'chi_square_quantile', 'choose_views', 'decode_image', 'discretise', 'error_statistics', 'estimate_time_offset', 'euroc_cameras', 'example_drive', 'find_stillness', 'finds_april_grids', 'fit_accelerometer', 'fit_accelerometer_poses', 'fit_ellipsoid', 'fit_gyroscope', 'fit_gyroscope_bias', 'format_seconds', 'gps_from_unix', 'image_array', 'image_measurement', 'imu_noise_from', 'is_eqvio', 'leap_seconds_known_until', 'load_slam', 'local_positions', 'message_fingerprints', 'message_type', 'normalised_error_squared', 'open_broad', 'open_csv', 'open_eqvio', 'open_euroc', 'open_euroc_images', 'open_image_folder', 'open_lcm_log', 'open_nmea', 'open_video', 'orientation_error', 'parse_nmea', 'parse_seconds', 'quantile', 'read_any_rig', 'read_points', 'read_rig', 'read_slam_options', 'read_tracks', 'read_tum', 'relative_error', 'root_mean_square', 'sampled_path', 'save_slam', 'scenario_names', 'simulate', 'simulate_camera', 'simulate_clock', 'simulate_gps_time', 'slam_options_for_images', 'slam_options_text', 'so3', 'street', 'unix_from_gps', 'update_rig', 'write_geojson', 'write_gpx', 'write_kml', 'write_ply', 'write_points', 'write_rig', 'write_slam_options', 'write_tracks', 'write_tum']
+__all__: list[str] = ['AbsoluteError', 'AccelerometerFit', 'AccelerometerOptions', 'Alignment', 'AllanFit', 'AllanOptions', 'AllanTerm', 'AnchoredRun', 'Association', 'CalibrationTarget', 'Camera', 'CameraCalibration', 'CameraFit', 'CameraFitOptions', 'CameraFitView', 'CameraImuCamera', 'CameraImuCheck', 'CameraImuFinding', 'CameraImuFit', 'CameraImuOptions', 'CameraImuProgress', 'CameraImuStart', 'CameraImuView', 'CameraModel', 'CameraRecording', 'CameraRun', 'CarMotion', 'CircleMotion', 'ClockCalibration', 'ClockCalibrationResult', 'ClockChain', 'ClockLine', 'ClockModel', 'Consistency', 'CounterUnwrapper', 'DataError', 'DiscreteImuNoise', 'DistortionModel', 'ESTIMATE_CHANNEL', 'EllipsoidAdvice', 'EllipsoidCollector', 'EllipsoidFit', 'EllipsoidOptions', 'EqvioSource', 'ErrorStateFilter', 'ErrorStateOptions', 'ErrorStateRun', 'ErrorStatistics', 'Estimate', 'EstimateStatus', 'EstimateValid', 'EulerTrajectory', 'EulerTrajectoryFit', 'FUSION_CHANNEL', 'FeatureTracker', 'FeatureTrackerOptions', 'FeatureTrackerTimes', 'FeatureVideo', 'FeaturesArrays', 'FeaturesMeasurement', 'FigureEightMotion', 'FusionOutcome', 'FusionPreset', 'FusionPresetSensors', 'FusionResult', 'FusionStartOptions', 'GPS_CHANNEL', 'GpsArrays', 'GpsCalibration', 'GpsClock', 'GpsFixType', 'GpsMeasurement', 'GpsModel', 'GyroscopeFit', 'GyroscopeOptions', 'HAS_VISION', 'HandHeldMotion', 'IMAGE_CHANNEL', 'IMU_CHANNEL', 'ImageMeasurement', 'ImageSlam', 'ImuAllan', 'ImuArrays', 'ImuCalibration', 'ImuIntegration', 'ImuMeasurement', 'ImuModel', 'ImuNoise', 'ImuNoiseFit', 'ImuSampleModel', 'ImuSampling', 'InertialSlam', 'InertialTriadModel', 'IntrinsicsQuality', 'InverseDepthPoint', 'KnownLandmark', 'LcmLogReader', 'LocalFrame', 'LookAtMotion', 'MAGNETOMETER_CHANNEL', 'MadgwickFilter', 'MadgwickOptions', 'MadgwickResult', 'MagnetometerAlignment', 'MagnetometerAlignmentOptions', 'MagnetometerArrays', 'MagnetometerCalibration', 'MagnetometerMeasurement', 'MagnetometerModel', 'MapAnchorOptions', 'MeasurementSource', 'MonoSlam', 'Motion', 'MotionArrays', 'MountedMotion', 'MountingQuality', 'NO_TIME', 'NmeaFixes', 'ODOMETRY_CHANNEL', 'OdometryArrays', 'OdometryMeasurement', 'OrientationError', 'PedestrianMotion', 'Pose3', 'PoseSpline', 'PoseSplineFit', 'PoseStates', 'PredictOutcome', 'Quality', 'REFERENCE_CHANNEL', 'Random', 'Recording', 'ReferenceArrays', 'ReferenceMeasurement', 'RelativeError', 'RestFirstMotion', 'RestMotion', 'RestNoise', 'Rig', 'RotationForm', 'RotationSpline', 'RotationStates', 'SOURCE_STATUS_CHANNEL', 'STATISTICS_CHANNEL', 'Scenario', 'ScenarioStreams', 'Scene', 'SceneRenderer', 'SimulatedRun', 'Simulation', 'SlamAssociationOptions', 'SlamConsistency', 'SlamCounts', 'SlamFeatureArrays', 'SlamFeatureState', 'SlamFile', 'SlamFrame', 'SlamLandmarkArrays', 'SlamMapArrays', 'SlamMapOptions', 'SlamMotion', 'SlamOptions', 'SlamPrecision', 'SlamPredictionArrays', 'SlamRun', 'SlamSnapshot', 'SlamStartOptions', 'SplineGrid', 'StandStillOptions', 'StillSegment', 'Stillness', 'StillnessDetector', 'StillnessOptions', 'StreamClockModel', 'StreetModel', 'TRACKS_CHANNEL', 'TargetDetection', 'TargetDetector', 'TargetView', 'TimeOffsetResult', 'TrackArrays', 'TrackOrigin', 'Trajectory', 'TriadCalibration', 'TriadQuality', 'TruthArrays', 'VectorSpline', 'VectorSplineFit', 'Verdict', 'VisualOdometryModel', 'WaypointMotion', 'absolute_error', 'align_magnetometer', 'align_points', 'aligned', 'allan_fit', 'analyse_imu_noise', 'anchor_run', 'april_grid', 'associate', 'average_consistency', 'beta_from_gyro', 'box_room', 'calibrate_camera', 'calibrate_camera_imu', 'calibrate_clock', 'checkerboard', 'chi_square_cdf', 'chi_square_quantile', 'choose_views', 'decode_image', 'discretise', 'error_statistics', 'estimate_time_offset', 'euroc_cameras', 'example_drive', 'find_stillness', 'finds_april_grids', 'fit_accelerometer', 'fit_accelerometer_poses', 'fit_ellipsoid', 'fit_euler_trajectory', 'fit_gyroscope', 'fit_gyroscope_bias', 'fit_pose_spline', 'fit_vector_spline', 'format_seconds', 'gps_from_unix', 'image_array', 'image_measurement', 'imu_noise_from', 'is_eqvio', 'leap_seconds_known_until', 'lint_camera_imu', 'load_slam', 'local_positions', 'message_fingerprints', 'message_type', 'normalised_error_squared', 'open_broad', 'open_csv', 'open_eqvio', 'open_euroc', 'open_euroc_images', 'open_image_folder', 'open_lcm_log', 'open_nmea', 'open_video', 'orientation_error', 'parse_nmea', 'parse_seconds', 'quantile', 'read_any_rig', 'read_points', 'read_rig', 'read_slam_options', 'read_tracks', 'read_tum', 'relative_error', 'root_mean_square', 'sampled_path', 'save_slam', 'scenario_names', 'simulate', 'simulate_camera', 'simulate_clock', 'simulate_gps_time', 'slam_options_for_images', 'slam_options_text', 'so3', 'street', 'unix_from_gps', 'update_rig', 'write_geojson', 'write_gpx', 'write_kalibr_camchain', 'write_kalibr_imu', 'write_kml', 'write_ply', 'write_points', 'write_rig', 'write_slam_options', 'write_tracks', 'write_tum']
 class DataError(ValueError):
     """
     What is wrong in a file or message: where (file, line or byte), which field, which value.
@@ -769,6 +769,81 @@ class IntrinsicsQuality:
     @reprojection_rms_px.setter
     def reprojection_rms_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
+class MountingQuality:
+    """
+    How it was found where a camera sits on the IMU and by how much their clocks differ, and how far that may be trusted. What is not known is NaN.
+    """
+    verdict: Verdict
+    def __init__(self) -> None:
+        ...
+    def set_deviations(self, T_body_camera: Pose3, covariance: numpy.typing.ArrayLike) -> None:
+        """
+        Sets the deviations from what a camera-IMU calibration finds. covariance (7, 7): of a small turn about the body's axes [rad] (R_camera_body Exp(turn)), of the translation of T_camera_body [m], of the time offset [s].
+        """
+    @property
+    def line_delay_s(self) -> float:
+        """
+        a rolling shutter's time from one row to the next [s]; negative when it begins below
+        """
+    @line_delay_s.setter
+    def line_delay_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def line_delay_sigma_s(self) -> float:
+        """
+        its deviation [s]
+        """
+    @line_delay_sigma_s.setter
+    def line_delay_sigma_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def method(self) -> str:
+        """
+        "camera-imu"
+        """
+    @method.setter
+    def method(self, arg0: str) -> None:
+        ...
+    @property
+    def pictures(self) -> int:
+        """
+        that were used
+        """
+    @pictures.setter
+    def pictures(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def reasons(self) -> list[str]:
+        """
+        Copies of the sentences, one line each: assign a list to change them.
+        """
+    @reasons.setter
+    def reasons(self, arg1: collections.abc.Sequence[str]) -> None:
+        ...
+    @property
+    def rotation_sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [rad]: small turns of the camera about the body's axes
+        """
+    @rotation_sigma.setter
+    def rotation_sigma(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
+    @property
+    def time_offset_sigma_s(self) -> float:
+        """
+        deviation of time_offset_s [s]
+        """
+    @time_offset_sigma_s.setter
+    def time_offset_sigma_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def translation_sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [m]: of T_body_camera's translation, along the body's axes
+        """
+    @translation_sigma.setter
+    def translation_sigma(self, arg1: numpy.typing.ArrayLike) -> None:
+        ...
 class TriadCalibration:
     """
     corrected = matrix @ (raw - bias)
@@ -930,6 +1005,14 @@ class CameraCalibration:
         """
     @intrinsics_quality.setter
     def intrinsics_quality(self, arg0: IntrinsicsQuality | None) -> None:
+        ...
+    @property
+    def mounting_quality(self) -> MountingQuality | None:
+        """
+        How T_body_camera and time_offset_s were found; None when nobody has said.
+        """
+    @mounting_quality.setter
+    def mounting_quality(self, arg0: MountingQuality | None) -> None:
         ...
     @property
     def rate_hz(self) -> float:
@@ -4563,6 +4646,772 @@ class CameraFit:
     @property
     def worst_uncertainty_px(self) -> float:
         ...
+class RotationForm:
+    """
+    How the IMU's attitude is written as a spline.
+    
+    Members:
+    
+      CUMULATIVE
+    
+      THREE_ANGLES
+    """
+    CUMULATIVE: typing.ClassVar[RotationForm]
+    THREE_ANGLES: typing.ClassVar[RotationForm]
+    __members__: typing.ClassVar[dict[str, RotationForm]]
+    @typing.overload
+    def __eq__(self, other: RotationForm) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: RotationForm) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class CameraRecording:
+    """
+    What one camera of the rig has seen: CameraRecording(camera, views).
+    """
+    def __init__(self, camera: CameraCalibration, views: collections.abc.Sequence[TargetView]) -> None:
+        ...
+    @property
+    def camera(self) -> CameraCalibration:
+        """
+        CameraCalibration: intrinsics, with their deviations when it has them; its pose plays no part
+        """
+    @property
+    def views(self) -> list[TargetView]:
+        """
+        [TargetView] with their times on the camera's clock
+        """
+class CameraImuOptions:
+    """
+    Options of calibrate_camera_imu; every field is a keyword.
+    """
+    refine_intrinsics: bool
+    rotation: RotationForm
+    def __init__(self, **kwargs) -> None:
+        ...
+    def check(self) -> None:
+        ...
+    @property
+    def adapt_noise(self) -> bool:
+        """
+        noise of both IMU sensors and of each picture from the residuals, then once more
+        """
+    @adapt_noise.setter
+    def adapt_noise(self, arg0: bool) -> None:
+        ...
+    @property
+    def bias_spacing_s(self) -> float:
+        """
+        biases run straight between knots so far apart
+        """
+    @bias_spacing_s.setter
+    def bias_spacing_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def check_line_delay(self) -> bool:
+        """
+        where it is not estimated: would it be another than 0?
+        """
+    @check_line_delay.setter
+    def check_line_delay(self, arg0: bool) -> None:
+        ...
+    @property
+    def corner_sigma_px(self) -> float:
+        """
+        of a coordinate
+        """
+    @corner_sigma_px.setter
+    def corner_sigma_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def estimate_drift(self) -> bool:
+        """
+        the offset changes evenly over the recording
+        """
+    @estimate_drift.setter
+    def estimate_drift(self, arg0: bool) -> None:
+        ...
+    @property
+    def estimate_gravity(self) -> bool:
+        """
+        its size too
+        """
+    @estimate_gravity.setter
+    def estimate_gravity(self, arg0: bool) -> None:
+        ...
+    @property
+    def estimate_imu_matrices(self) -> bool:
+        """
+        scale and misalignment of gyroscope and accelerometer
+        """
+    @estimate_imu_matrices.setter
+    def estimate_imu_matrices(self, arg0: bool) -> None:
+        ...
+    @property
+    def estimate_line_delay(self) -> bool:
+        """
+        rolling shutter: time from one row to the next
+        """
+    @estimate_line_delay.setter
+    def estimate_line_delay(self, arg0: bool) -> None:
+        ...
+    @property
+    def gravity(self) -> float:
+        """
+        [m/s^2]
+        """
+    @gravity.setter
+    def gravity(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def knot_spacing_s(self) -> float:
+        """
+        0: from the IMU's spectrum
+        """
+    @knot_spacing_s.setter
+    def knot_spacing_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def loss_sigmas(self) -> float:
+        """
+        Cauchy's: a corner so far off counts half
+        """
+    @loss_sigmas.setter
+    def loss_sigmas(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_iterations(self) -> int:
+        ...
+    @max_iterations.setter
+    def max_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def order(self) -> int:
+        """
+        of the pose's spline, 4 or 6 are usual
+        """
+    @order.setter
+    def order(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def time_limit_s(self) -> float:
+        """
+        0: none
+        """
+    @time_limit_s.setter
+    def time_limit_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def time_offset_s(self) -> float | None:
+        """
+        known to half a second; None: all offsets are tried
+        """
+    @time_offset_s.setter
+    def time_offset_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+class CameraImuProgress:
+    """
+    Where the solution stands.
+    """
+    @property
+    def cost(self) -> float:
+        ...
+    @property
+    def elapsed_s(self) -> float:
+        ...
+    @property
+    def iteration(self) -> int:
+        ...
+    @property
+    def time_offset_s(self) -> float:
+        """
+        of the first camera
+        """
+class CameraImuCheck:
+    """
+    A quantity, estimated, or (where it was held) one step from there with everything else free. NaN: not looked at.
+    """
+    @property
+    def estimated(self) -> bool:
+        ...
+    @property
+    def sigma(self) -> float:
+        ...
+    @property
+    def value(self) -> float:
+        ...
+class CameraImuView:
+    """
+    What became of a picture.
+    """
+    @property
+    def reason(self) -> str:
+        """
+        why it was not used
+        """
+    @property
+    def rms_px(self) -> float:
+        """
+        of its corners' distances
+        """
+    @property
+    def sigma_px(self) -> float:
+        """
+        that each coordinate of its corners was given
+        """
+    @property
+    def used(self) -> bool:
+        ...
+class CameraImuStart:
+    """
+    Start values of a camera, from the recording alone.
+    """
+    @property
+    def R_camera_imu_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def correlation(self) -> float:
+        """
+        of the turn rates, at the offset
+        """
+    @property
+    def curve_correlation(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N,) correlation of the turn rates there
+        """
+    @property
+    def curve_offset_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N,) all offsets that were tried
+        """
+    @property
+    def excitation(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) deviations of the turn rate along its main axes [rad/s]
+        """
+    @property
+    def gyroscope_bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [rad/s]
+        """
+    @property
+    def rate_ratio(self) -> float:
+        """
+        size of the gyroscope's rates over that of the camera's
+        """
+    @property
+    def second_correlation(self) -> float:
+        """
+        the best elsewhere
+        """
+    @property
+    def time_offset_s(self) -> float:
+        ...
+class CameraImuCamera:
+    """
+    One camera in the result of calibrate_camera_imu.
+    """
+    @property
+    def T_camera_imu(self) -> Pose3:
+        ...
+    @property
+    def by_intrinsics(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (7, 8) how the mounting moves with fx fy cx cy and the distortion that are held
+        """
+    @property
+    def camera(self) -> CameraCalibration:
+        """
+        as given, with pose and offset; intrinsics when refined
+        """
+    @property
+    def corner_chi(self) -> float:
+        """
+        root of the mean square of the residuals over their deviation: 1 is right
+        """
+    @property
+    def corner_id(self) -> numpy.typing.NDArray[numpy.int64]:
+        ...
+    @property
+    def corner_pixel_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def corner_residual_px(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, 2) found less projected
+        """
+    @property
+    def corner_view(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (M,) index of the picture of each corner that was used
+        """
+    @property
+    def corner_weight(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M,) that the loss leaves it
+        """
+    @property
+    def covariance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (7, 7) of a small turn of the camera about the IMU's axes [rad] (R_camera_imu Exp(turn)), of the translation of T_camera_imu [m], of the offset [s]
+        """
+    @property
+    def intrinsics_change(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (8,) that the recording would make, or has made when refined
+        """
+    @property
+    def intrinsics_sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (8,) that were taken for fx fy cx cy and the distortion; when refined: found
+        """
+    @property
+    def line_delay_s(self) -> CameraImuCheck:
+        """
+        from one row to the next
+        """
+    @property
+    def offset_drift(self) -> CameraImuCheck:
+        """
+        [s/s]
+        """
+    @property
+    def sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (7,) deviations of covariance: of all that follow
+        """
+    @property
+    def sigma_by_blocks(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (7,) from how pieces of the recording pull
+        """
+    @property
+    def sigma_by_intrinsics(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (7,) from the deviations of the intrinsics
+        """
+    @property
+    def sigma_by_noise(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (7,) from the noise as given or adapted
+        """
+    @property
+    def start(self) -> CameraImuStart:
+        ...
+    @property
+    def time_offset_s(self) -> float:
+        """
+        t_imu = t_camera + offset; with a drift, in the middle of the recording
+        """
+    @property
+    def views(self) -> list[CameraImuView]:
+        """
+        one for each picture that was given
+        """
+class CameraImuFit:
+    """
+    Result of calibrate_camera_imu.
+    """
+    @property
+    def accelerometer_chi(self) -> float:
+        ...
+    @property
+    def accelerometer_matrix(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 3) likewise, a lower triangle
+        """
+    @property
+    def accelerometer_matrix_sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 3)
+        """
+    @property
+    def accelerometer_noise_scale(self) -> float:
+        ...
+    @property
+    def bandwidth_hz(self) -> float:
+        """
+        below which the IMU's spectrum holds the motion
+        """
+    @property
+    def bias_time_ns(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (K,)
+        """
+    @property
+    def biases(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K, 6) gyroscope [rad/s], then accelerometer [m/s^2], straight between bias_time_ns
+        """
+    @property
+    def cameras(self) -> list[CameraImuCamera]:
+        """
+        [CameraImuCamera], one for each that was given
+        """
+    @property
+    def converged(self) -> bool:
+        ...
+    @property
+    def cost(self) -> float:
+        ...
+    @property
+    def counts(self) -> dict:
+        """
+        {name: number} of samples used and skipped, and why
+        """
+    @property
+    def gravity_direction_sigma(self) -> float:
+        """
+        [rad]
+        """
+    @property
+    def gravity_size(self) -> CameraImuCheck:
+        """
+        CameraImuCheck [m/s^2]
+        """
+    @property
+    def gravity_target(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) in target [m/s^2]
+        """
+    @property
+    def gyroscope_chi(self) -> float:
+        """
+        root of the mean square of the residuals over their deviation: 1 is right
+        """
+    @property
+    def gyroscope_matrix(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 3) reading = matrix * what the sensor feels + bias
+        """
+    @property
+    def gyroscope_matrix_sigma(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 3)
+        """
+    @property
+    def gyroscope_noise_scale(self) -> float:
+        """
+        on the noise that was given, when adapted
+        """
+    @property
+    def imu_residuals(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 6) predicted less read at imu_time_ns, over their deviations: gyroscope, then accelerometer
+        """
+    @property
+    def imu_time_ns(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (N,) of the samples that were used
+        """
+    @property
+    def iterations(self) -> int:
+        ...
+    @property
+    def knot_reason(self) -> str:
+        """
+        why this spacing
+        """
+    @property
+    def knot_spacing_s(self) -> float:
+        ...
+    @property
+    def quality(self) -> Quality:
+        ...
+    @property
+    def solve_cpu_s(self) -> float:
+        ...
+    @property
+    def start_cpu_s(self) -> float:
+        ...
+    @property
+    def stopped(self) -> str:
+        """
+        why, when it has not converged: 'interrupted', 'time limit'
+        """
+    @property
+    def target_imu_position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) of the IMU in target at imu_time_ns [m]
+        """
+    @property
+    def target_imu_q_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 4) attitude of the IMU in target at imu_time_ns
+        """
+class CameraImuFinding:
+    """
+    What lint_camera_imu found. severity OK: to be known; FAIR: a better recording would help; WARN: the result is in doubt; REFUSED: the calibration would fail or be wrong.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def code(self) -> str:
+        """
+        "imu.gyroscope_unit", "camera.gaps", ...: the same in all versions
+        """
+    @property
+    def severity(self) -> Verdict:
+        ...
+    @property
+    def text(self) -> str:
+        """
+        complete sentences with the figures
+        """
+class RotationStates:
+    """
+    What a rotation spline gives at N times.
+    """
+    @property
+    def angular_acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) in body [rad/s^2]
+        """
+    @property
+    def angular_velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) in body [rad/s]
+        """
+    @property
+    def q_world_body_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 4)
+        """
+class PoseStates(RotationStates):
+    """
+    What a spline of poses gives at N times.
+    """
+    @property
+    def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) in world [m/s^2]
+        """
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) in world [m]
+        """
+    @property
+    def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, 3) in world [m/s]
+        """
+class SplineGrid:
+    """
+    Knots of a uniform B-spline at start_s + i * spacing_s. Order 4 is cubic, 6 quintic; 3 to 8 can be had. ValueError names a field that is out of range.
+    """
+    @staticmethod
+    def over(begin_s: typing.SupportsFloat | typing.SupportsIndex, end_s: typing.SupportsFloat | typing.SupportsIndex, spacing_s: typing.SupportsFloat | typing.SupportsIndex, order: typing.SupportsInt | typing.SupportsIndex = 4) -> SplineGrid:
+        """
+        The shortest grid that covers these times, beginning at begin_s.
+        """
+    def __init__(self, start_s: typing.SupportsFloat | typing.SupportsIndex, spacing_s: typing.SupportsFloat | typing.SupportsIndex, segments: typing.SupportsInt | typing.SupportsIndex, order: typing.SupportsInt | typing.SupportsIndex = 4) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def abscissae_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,): the time at which each control point has its largest influence
+        """
+    @property
+    def control_points(self) -> int:
+        """
+        their number, segments + order - 1
+        """
+    @property
+    def end_s(self) -> float:
+        """
+        end of the last segment
+        """
+    @property
+    def order(self) -> int:
+        """
+        degree + 1
+        """
+    @property
+    def segments(self) -> int:
+        ...
+    @property
+    def spacing_s(self) -> float:
+        ...
+    @property
+    def start_s(self) -> float:
+        """
+        begin of the first segment
+        """
+class VectorSpline:
+    """
+    A function of time on R^d. Before the first and behind the last segment its polynomial goes on.
+    """
+    def __init__(self, grid: SplineGrid, control_points: numpy.typing.NDArray[numpy.float64]) -> None:
+        """
+        control_points (n, d), n = grid.control_points
+        """
+    def value(self, times_s: numpy.typing.NDArray[numpy.float64], derivative: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, d) at times (N,) [s]; derivative by time: 0, 1 or 2.
+        """
+    @property
+    def control_points(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n, d), a copy
+        """
+    @property
+    def grid(self) -> SplineGrid:
+        ...
+class RotationSpline:
+    """
+    An attitude R_world_body over time, a cumulative B-spline on SO(3): no attitude is special. Neighbouring control points must be less than half a turn apart.
+    """
+    def __init__(self, grid: SplineGrid, control_points: numpy.typing.NDArray[numpy.float64]) -> None:
+        """
+        control_points (n, 4) wxyz, n = grid.control_points
+        """
+    def at(self, times_s: numpy.typing.NDArray[numpy.float64]) -> RotationStates:
+        """
+        RotationStates at times (N,) [s].
+        """
+    @property
+    def control_points(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n, 4) wxyz, a copy
+        """
+    @property
+    def grid(self) -> SplineGrid:
+        ...
+class PoseSpline:
+    """
+    A pose T_world_body over time: rotation and position apart, on one grid.
+    """
+    def __init__(self, rotation: RotationSpline, position: VectorSpline) -> None:
+        """
+        ValueError when the grids differ or position has not three columns.
+        """
+    def at(self, times_s: numpy.typing.NDArray[numpy.float64]) -> PoseStates:
+        """
+        PoseStates at times (N,) [s].
+        """
+    def resample(self, times_ns: numpy.typing.NDArray[numpy.int64], origin_ns: typing.SupportsInt | typing.SupportsIndex = 0) -> Trajectory:
+        """
+        Trajectory with the poses at these times (N,) int64; origin_ns: the time that is 0 s of the spline.
+        """
+    @property
+    def grid(self) -> SplineGrid:
+        ...
+    @property
+    def position(self) -> VectorSpline:
+        ...
+    @property
+    def rotation(self) -> RotationSpline:
+        ...
+class EulerTrajectory:
+    """
+    A pose T_world_body over time as six B-splines, three angles about a mean attitude and a position: R = R_mean Rz(phi3) Ry(phi2) Rx(phi1). For motion about one attitude; PoseSpline has no such limit.
+    """
+    def __init__(self, mean_wxyz: numpy.typing.ArrayLike, grid: SplineGrid, control_points: numpy.typing.NDArray[numpy.float64]) -> None:
+        """
+        control_points (n, 6): three angles [rad] and the position [m]
+        """
+    def at(self, times_s: numpy.typing.NDArray[numpy.float64]) -> PoseStates:
+        """
+        PoseStates at times (N,) [s].
+        """
+    def resample(self, times_ns: numpy.typing.NDArray[numpy.int64], origin_ns: typing.SupportsInt | typing.SupportsIndex = 0) -> Trajectory:
+        """
+        Trajectory with the poses at these times (N,) int64; origin_ns: the time that is 0 s of the spline.
+        """
+    @property
+    def control_points(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n, 6), a copy
+        """
+    @property
+    def grid(self) -> SplineGrid:
+        ...
+    @property
+    def mean_wxyz(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+class VectorSplineFit:
+    """
+    Result of fit_vector_spline.
+    """
+    @property
+    def rms(self) -> float:
+        """
+        of the residuals' norms
+        """
+    @property
+    def spline(self) -> VectorSpline:
+        ...
+class PoseSplineFit:
+    """
+    Result of fit_pose_spline.
+    """
+    @property
+    def converged(self) -> bool:
+        ...
+    @property
+    def iterations(self) -> int:
+        ...
+    @property
+    def rms_position(self) -> float:
+        """
+        of their distances [m]
+        """
+    @property
+    def rms_rotation(self) -> float:
+        """
+        of the residuals' angles [rad]
+        """
+    @property
+    def spline(self) -> PoseSpline:
+        ...
+class EulerTrajectoryFit:
+    """
+    Result of fit_euler_trajectory.
+    """
+    @property
+    def rms_position(self) -> float:
+        """
+        of their distances [m]
+        """
+    @property
+    def rms_rotation(self) -> float:
+        """
+        of the residuals' angles [rad]
+        """
+    @property
+    def trajectory(self) -> EulerTrajectory:
+        ...
 class FeatureVideo:
     """
     A video file of features over the camera's pictures: .mp4 or .avi.
@@ -7635,6 +8484,10 @@ def calibrate_camera(target: CalibrationTarget, views: collections.abc.Sequence[
     """
     Intrinsics and distortion of a camera from the target's corners in several pictures. DataError when there is nothing to be solved.
     """
+def calibrate_camera_imu(target: CalibrationTarget, recordings: collections.abc.Sequence[CameraRecording], imu_times_ns: numpy.typing.NDArray[numpy.int64], angular_velocity: numpy.typing.NDArray[numpy.float64], specific_force: numpy.typing.NDArray[numpy.float64], noise: ImuNoise | None = None, options: CameraImuOptions | None = None, progress: typing.Any = None) -> CameraImuFit:
+    """
+    Where cameras sit on an IMU, and by how much their clocks differ, from a target that was waved in front of the rig (or the rig before the target). recordings: [CameraRecording], one for each camera; imu_times_ns (N,), angular_velocity (N, 3) [rad/s], specific_force (N, 3) [m/s^2] of the IMU, calibrated; noise: ImuNoise; progress: called with CameraImuProgress after each iteration, False stops. Ctrl-C stops too: the best so far is the result, with stopped = 'interrupted'. DataError for what cannot be calibrated, with the reason.
+    """
 def calibrate_clock(times_ns: numpy.typing.NDArray[numpy.int64], host_times_ns: numpy.typing.NDArray[numpy.int64], **kwargs) -> ClockCalibrationResult:
     """
     Stamps and arrivals of one stream, int64 (N,) in the order of arrival; options as of ClockModel.
@@ -7699,6 +8552,10 @@ def fit_ellipsoid(readings: numpy.typing.NDArray[numpy.float64], options: Ellips
     """
     Fits an ellipsoid to float64 (N, 3) readings of any unit; weights (N,): information of a reading relative to the others. Bad data do not raise: see EllipsoidFit.quality.
     """
+def fit_euler_trajectory(times_s: numpy.typing.NDArray[numpy.float64], q_world_body_wxyz: numpy.typing.NDArray[numpy.float64], position: numpy.typing.NDArray[numpy.float64], *, order: typing.SupportsInt | typing.SupportsIndex = 4, spacing_s: typing.SupportsFloat | typing.SupportsIndex = 0.1, smoothing: typing.SupportsFloat | typing.SupportsIndex = 1e-09) -> EulerTrajectoryFit:
+    """
+    The same as three angles about the mean attitude; DataError also for motion too wide for them (the second angle beyond 80 degrees).
+    """
 def fit_gyroscope(times_ns: numpy.typing.NDArray[numpy.int64], gyroscope: numpy.typing.NDArray[numpy.float64], segments: collections.abc.Sequence[StillSegment], accelerometer: AccelerometerFit, options: GyroscopeOptions = ...) -> GyroscopeFit:
     """
     Bias, scale and misalignment from the turns between the still segments of the same recording.
@@ -7706,6 +8563,14 @@ def fit_gyroscope(times_ns: numpy.typing.NDArray[numpy.int64], gyroscope: numpy.
 def fit_gyroscope_bias(segments: collections.abc.Sequence[StillSegment]) -> GyroscopeFit:
     """
     Bias alone.
+    """
+def fit_pose_spline(times_s: numpy.typing.NDArray[numpy.float64], q_world_body_wxyz: numpy.typing.NDArray[numpy.float64], position: numpy.typing.NDArray[numpy.float64], *, order: typing.SupportsInt | typing.SupportsIndex = 4, spacing_s: typing.SupportsFloat | typing.SupportsIndex = 0.1, smoothing: typing.SupportsFloat | typing.SupportsIndex = 1e-09, max_iterations: typing.SupportsInt | typing.SupportsIndex = 20) -> PoseSplineFit:
+    """
+    Least squares of poses: times_s (N,) [s], q_world_body_wxyz (N, 4), position (N, 3) [m]. Otherwise as fit_vector_spline; DataError also for poses that follow each other by more than 120 degrees.
+    """
+def fit_vector_spline(times_s: numpy.typing.NDArray[numpy.float64], values: numpy.typing.NDArray[numpy.float64], *, order: typing.SupportsInt | typing.SupportsIndex = 4, spacing_s: typing.SupportsFloat | typing.SupportsIndex = 0.1, smoothing: typing.SupportsFloat | typing.SupportsIndex = 1e-09) -> VectorSplineFit:
+    """
+    Least squares: times_s (N,) [s] increasing, values (N, d). The grid begins at the first time and covers the last. smoothing: weight of the control points' second differences, which decides where there are no samples. DataError names what is not finite, not in order, or so late that the spline would take too many control points.
     """
 def format_seconds(time_ns: typing.SupportsInt | typing.SupportsIndex) -> str:
     """
@@ -7734,6 +8599,10 @@ def is_eqvio(path: os.PathLike | str | bytes) -> bool:
 def leap_seconds_known_until() -> str:
     """
     First day, as YYYY-MM-DD, of which the library's table of leap seconds does not know.
+    """
+def lint_camera_imu(target: CalibrationTarget, recordings: collections.abc.Sequence[CameraRecording], imu_times_ns: numpy.typing.NDArray[numpy.int64], angular_velocity: numpy.typing.NDArray[numpy.float64], specific_force: numpy.typing.NDArray[numpy.float64], noise: ImuNoise | None = None, imu_rate_hz: typing.SupportsFloat | typing.SupportsIndex = 0) -> list[CameraImuFinding]:
+    """
+    Looks at a recording before it is calibrated: units, rates, gaps, times, saturation, clocks, the target in the pictures, noise densities. recordings: [CameraRecording]; imu_times_ns (N,), angular_velocity (N, 3) [rad/s], specific_force (N, 3) [m/s^2] of the IMU; imu_rate_hz nominal, 0 when unknown. The worst finding comes first; none for a good recording.
     """
 def load_slam(path: os.PathLike | str | bytes) -> SlamFile:
     """
@@ -7894,6 +8763,14 @@ def write_geojson(path: os.PathLike | str | bytes, latitude_longitude_altitude: 
 def write_gpx(path: os.PathLike | str | bytes, latitude_longitude_altitude: numpy.typing.NDArray[numpy.float64], *, utc_ns: numpy.typing.NDArray[numpy.int64] | None = None, sigma_horizontal: numpy.typing.NDArray[numpy.float64] | None = None, sigma_vertical: numpy.typing.NDArray[numpy.float64] | None = None, segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], name: str = 'path', description: str = '', geoid_height: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
     """
     GPX 1.1: path (N, 3) [rad, rad, m above the ellipsoid], times int64 (N,) [ns since 1970, UTC], deviations (N,) [m]. segments: indices of points before which no line is drawn. geoid_height [m] is subtracted.
+    """
+def write_kalibr_camchain(path: os.PathLike | str | bytes, rig: Rig) -> None:
+    """
+    The rig's cameras as Kalibr's camchain: cam0, cam1, ... with T_cam_imu, T_cn_cnm1 and timeshift_cam_imu (t_imu = t_cam + shift). ValueError without a camera.
+    """
+def write_kalibr_imu(path: os.PathLike | str | bytes, rig: Rig) -> None:
+    """
+    The IMU's noise and rate as Kalibr's imu.yaml. ValueError without an IMU.
     """
 def write_kml(path: os.PathLike | str | bytes, latitude_longitude_altitude: numpy.typing.NDArray[numpy.float64], *, utc_ns: numpy.typing.NDArray[numpy.int64] | None = None, sigma_horizontal: numpy.typing.NDArray[numpy.float64] | None = None, sigma_vertical: numpy.typing.NDArray[numpy.float64] | None = None, segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], name: str = 'path', description: str = '', geoid_height: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
     """
