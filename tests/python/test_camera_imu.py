@@ -1,4 +1,4 @@
-"""calib/camera_imu and camera_imu_lint from Python: arrays in, result and findings out. What they find is tested in C++."""
+"""calib/camera_imu and camera_imu_lint from Python: arrays in, result and findings out."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def recording() -> dict:
         "angular_velocity": readings[:, :3].copy(),
         "specific_force": readings[:, 3:].copy(),
         "noise": libloc.ImuNoise(gyroscope_noise_density=1.6968e-4, accelerometer_noise_density=2e-3),
-            }
+    }
 
 
 def test_a_real_recording_is_fine_until_its_units_are_not(recording):
@@ -73,7 +73,9 @@ def test_mistakes_are_named():
     camera.name, camera.width_px, camera.height_px = "cam0", 640, 480
     camera.intrinsics_px = [500, 500, 320, 240]
     with pytest.raises(ValueError, match="999"):
-        libloc.lint_camera_imu(TARGET, [libloc.CameraRecording(camera, [view])], **nothing, noise=libloc.ImuNoise())
+        libloc.lint_camera_imu(
+            TARGET, [libloc.CameraRecording(camera, [view])], **nothing, noise=libloc.ImuNoise()
+        )
 
 
 T_BS = [  # EuRoC's T_body_camera of cam0
