@@ -99,13 +99,14 @@ TEST(CameraImuLint, GyroscopeInDegrees) {
   };
   expect_only(in_degrees, Verdict::kRefused, "imu.gyroscope_unit", {"deg/s", "57", "cam0", "Convert"});
   // The clocks have nothing in common.
-  expect_only(
-      [&](Input& in) {
-        in_degrees(in);
-        in.cameras.push_back(in.cameras[0]);
-        in.cameras[1].camera.name = "cam1";
-      },
-      Verdict::kRefused, "imu.gyroscope_unit", {"deg/s"});
+  Input apart = good();
+  in_degrees(apart);
+  for (ImuMeasurement& m : apart.imu) m.time_ns -= from_seconds(1e6);
+  const std::string apart_text = all_of(lint(apart));
+  EXPECT_NE(apart_text.find("refused imu.gyroscope_unit: The gyroscope seems to be in deg/s: the gyroscope's readings "
+                            "are 5"),
+            std::string::npos)
+      << apart_text;
   // Too few pictures to compare with: by size alone.
   Input blind = good();
   in_degrees(blind);
@@ -120,6 +121,13 @@ TEST(CameraImuLint, GyroscopeInDegrees) {
         for (ImuMeasurement& m : in.imu) m.angular_velocity *= 0.1;
       },
       Verdict::kWarn, "imu.gyroscope_unit", {"does not turn as much", "times the turn rates of cam0"});
+  // The camera whose clock is the IMU's has the say.
+  Input two = good();
+  for (ImuMeasurement& m : two.imu) m.angular_velocity *= 0.1;
+  two.cameras.insert(two.cameras.begin(), two.cameras[0]);
+  two.cameras[1].camera.name = "cam1";
+  for (TargetView& view : two.cameras[0].views) view.time_ns += from_seconds(1e6);
+  EXPECT_NE(all_of(lint(two)).find("times the turn rates of cam1"), std::string::npos) << all_of(lint(two));
 }
 
 TEST(CameraImuLint, AccelerometerInOtherUnits) {
@@ -133,13 +141,14 @@ TEST(CameraImuLint, AccelerometerInOtherUnits) {
   expect_only(times(100), Verdict::kRefused, "imu.accelerometer_unit", {"thousandths of g or in cm/s^2"});
   expect_only(times(16384 / 9.80665), Verdict::kRefused, "imu.accelerometer_unit", {"not m/s^2", "9.81"});
   // What some drivers call linear acceleration.
-  const test::WavedRig rig = test::wave({.seconds = 20, .noise = measured_noise()}, 1);
   Random random(4);
-  expect_only(
-      [&](Input& in) {
-        for (ImuMeasurement& m : in.imu) m.specific_force = random.normal3();
-      },
-      Verdict::kRefused, "imu.gravity_removed", {"lacks gravity"});
+  for (const double size : {0.65, 2.0}) {  // of a size as in g, and larger
+    expect_only(
+        [&](Input& in) {
+          for (ImuMeasurement& m : in.imu) m.specific_force = size * random.normal3();
+        },
+        Verdict::kRefused, "imu.gravity_removed", {"lacks gravity"});
+  }
 }
 
 TEST(CameraImuLint, RatesOfTheImu) {
@@ -221,6 +230,16 @@ TEST(CameraImuLint, Saturation) {
   EXPECT_NE(all_of(findings).find("The gyroscope comes to the end of its range (x at -2.1817, x at 2.1817, y"),
             std::string::npos)
       << all_of(findings);
+  // One time, but long.
+  expect_only(
+      [](Input& in) {
+        for (std::size_t i = 2000; i < 2012; ++i) in.imu[i].angular_velocity.y() = -4.3633;
+      },
+      Verdict::kWarn, "imu.saturated", {"(y at -4.3633 rad/s), in 12 readings, the longest time at 10.00 s"});
+  // No gyroscope has so small a range.
+  Input gentle = good();
+  for (ImuMeasurement& m : gentle.imu) m.angular_velocity = m.angular_velocity.cwiseMax(-1.2).cwiseMin(1.2);
+  EXPECT_EQ(all_of(lint(gentle)), "");
   // Coarse readings of a rig at rest, or of slow motion, stay the same too.
   for (const double resolution : {0.3, 0.01}) {
     Input coarse = good();
