@@ -53,6 +53,12 @@ constexpr double kTooSmall = 0.01;
 constexpr std::size_t kNoiseWindow = 32;  // samples
 constexpr double kQuietest = 0.1;         // of the windows
 
+// a - b [s], to the nanosecond unless they are centuries apart.
+double after(TimeNs a, TimeNs b) {
+  TimeNs difference = 0;
+  return __builtin_sub_overflow(a, b, &difference) ? apart_s(a, b) : to_seconds(difference);
+}
+
 std::string fixed(double value, int decimals) {
   std::array<char, 400> buffer{};
   const auto result =
@@ -70,7 +76,7 @@ double turn_rate_over(const ImuLook& imu, double step_s, double begin_s, double 
     Vector3d sum = Vector3d::Zero();
     int n = 0;
     for (; i < at.size() && at[i] < until; ++i, ++n) sum += imu.gyroscope.values[i];
-    sizes.push_back(sum.norm() / n);
+    sizes.push_back(sum.stableNorm() / n);
   }
   return sizes.empty() ? 0 : quantile(sizes, 0.5);
 }
@@ -90,7 +96,7 @@ void look_at_turns(const ImuLook& imu, std::span<const CameraRecording> cameras,
                    std::vector<CameraImuFinding>& out) {
   const std::string code = "imu.gyroscope_unit";
   std::vector<double> sizes;
-  for (const Vector3d& v : imu.gyroscope.values) sizes.push_back(v.norm());
+  for (const Vector3d& v : imu.gyroscope.values) sizes.push_back(v.stableNorm());
   const double middle = quantile(sizes, 0.5);
   const double large = quantile(sizes, 0.99);
   const std::string sizes_text = "median size " + number(middle) + ", 1 % of the readings above " + number(large);
@@ -168,7 +174,7 @@ std::string count_of(std::int64_t n, const std::string& what) {
 
 std::string number(double value) {
   const double size = std::abs(value);
-  if (size < 1) return to_text(value, 3);
+  if (!(size >= 1 && size < 1e9)) return to_text(value, 3);
   std::string text = fixed(value, size < 10 ? 2 : size < 100 ? 1 : 0);
   if (text.find('.') != std::string::npos) text.erase(text.find_last_not_of('0') + 1);
   if (text.ends_with('.')) text.pop_back();
@@ -188,10 +194,10 @@ StreamTimes look_at_times(std::span<const TimeNs> times) {
   if (times.empty()) return out;
   TimeNs latest = times[0];
   for (std::size_t i = 0; i < times.size(); ++i) {
-    const double since = apart_s(times[i], times[0]);
+    const double since = after(times[i], times[0]);
     if (i > 0 && times[i] < times[i - 1]) {
       ++out.steps_back;
-      const double back = apart_s(times[i - 1], times[i]);
+      const double back = after(times[i - 1], times[i]);
       if (back > out.longest_back_s) {
         out.longest_back_s = back;
         out.back_at_s = since + back;
@@ -231,7 +237,7 @@ void look_at_both(const ImuLook& imu, std::span<const CameraRecording> cameras, 
     const CameraLook& look = looks[c];
     if (look.first_ns == kNoTime) continue;
     const std::string& name = cameras[c].camera.name;
-    const double seen = apart_s(look.last_ns, look.first_ns);
+    const double seen = after(look.last_ns, look.first_ns);
     const double felt = imu.times.span_s();
     const double length = std::min(seen, felt);
     if (length < kShort) {

@@ -67,7 +67,7 @@ void look_at_noise(const ImuNoise& noise, const ImuLook& imu, std::vector<Camera
 
 // Words of the messages.
 std::string count_of(std::int64_t n, const std::string& what);  ///< "1 gap", "3 gaps"
-std::string number(double value);                               ///< three digits, no exponent for what is not small
+std::string number(double value);                               ///< three digits, an exponent only for 10^9 and up
 std::string percent(double share);
 std::string at_time(double t_s);  ///< "at 12.3 s"
 

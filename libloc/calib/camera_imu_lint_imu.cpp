@@ -171,7 +171,7 @@ void look_at_saturation(const Triad& triad, const std::vector<double>& at_s, std
 
 void look_at_gravity(const Triad& triad, std::vector<CameraImuFinding>& out) {
   std::vector<double> norms;
-  for (const Vector3d& v : triad.values) norms.push_back(v.norm());
+  for (const Vector3d& v : triad.values) norms.push_back(v.stableNorm());
   const double size = quantile(norms, 0.5);
   const double steady = size > 0 ? quantile(norms, 0.1) / size : 0;
   if (size > kLeastGravity * kGravity && size < kMostGravity * kGravity) return;

@@ -140,6 +140,7 @@ TEST(CameraImuLint, AccelerometerInOtherUnits) {
   expect_only(times(1000 / 9.80665), Verdict::kRefused, "imu.accelerometer_unit", {"thousandths of g or in cm/s^2"});
   expect_only(times(100), Verdict::kRefused, "imu.accelerometer_unit", {"thousandths of g or in cm/s^2"});
   expect_only(times(16384 / 9.80665), Verdict::kRefused, "imu.accelerometer_unit", {"not m/s^2", "9.81"});
+  expect_only(times(1e299), Verdict::kRefused, "imu.accelerometer_unit", {"not m/s^2", "e+299,"});
   // What some drivers call linear acceleration.
   Random random(4);
   for (const double size : {0.65, 2.0}) {  // of a size as in g, and larger
@@ -385,8 +386,8 @@ TEST(CameraImuLint, TheWorstComesFirst) {
   }
   input.imu_rate_hz = 100;
   const auto findings = lint(input);
-  std::vector<std::string> codes;
-  for (const CameraImuFinding& f : findings) codes.push_back(f.code);
+  std::vector<std::string> codes(findings.size());
+  std::ranges::transform(findings, codes.begin(), &CameraImuFinding::code);
   EXPECT_EQ(codes,
             std::vector<std::string>({"imu.gyroscope_unit", "imu.rate_not_nominal", "noise.default", "clocks.apart"}))
       << all_of(findings);
