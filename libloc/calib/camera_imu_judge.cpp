@@ -1,12 +1,11 @@
 #include "libloc/calib/camera_imu_judge.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
 
-#include "libloc/calib/camera_bundle.hpp"
+#include "libloc/calib/dense.hpp"
 #include "libloc/core/check.hpp"
 
 namespace loc::calib {
@@ -16,12 +15,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+constexpr double kLeastPivot = 1e-13;
 constexpr double kAlikePeaks = 0.9;
 constexpr double kDoubtfulNoise = 3;
 constexpr double kPulledApart = 2;
-constexpr double kByChance = 2;           // deviations
-// Deviations from which what was held is something else. What was held wrongly also pulls pieces of the recording apart,
-// so the deviations have grown with it.
+constexpr double kByChance = 2;  // deviations
+// Deviations from which what was held is something else. What was held wrongly also pulls pieces of the recording
+// apart, so the deviations have grown with it.
 constexpr double kSignificant = 2.5;
 constexpr double kRollingShutter = 1e-3;  // [s] from the first row to the last
 constexpr double kDrift = 1e-4;           // [s] over the recording
@@ -81,16 +81,17 @@ Part solve_for(const SharedEquations& e, std::vector<int> places) {
   const MatrixXd S = e.information(out.places, out.places);
   // Scaled, because units differ by many orders.
   const VectorXd scale = S.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::LDLT<MatrixXd> factor(scale.asDiagonal() * S * scale.asDiagonal());
-  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 1e-13)) {
+  const auto inverse = dense::solve_definite(scale.asDiagonal() * S * scale.asDiagonal(),
+                                             MatrixXd::Identity(S.rows(), S.cols()), kLeastPivot);
+  if (!inverse) {
     const auto n = static_cast<Index>(out.places.size());
     out.covariance = MatrixXd::Constant(n, n, kUnknown);
     out.step = out.by_noise = out.by_blocks = VectorXd::Constant(n, kUnknown);
     return out;
   }
-  out.covariance = scale.asDiagonal() * factor.solve(MatrixXd::Identity(S.rows(), S.cols())) * scale.asDiagonal();
+  out.covariance = scale.asDiagonal() * *inverse * scale.asDiagonal();
   const MatrixXd pulls = e.pulls(out.places, Eigen::all);
-  const MatrixXd moves = out.covariance * pulls;
+  const MatrixXd moves = dense::product(out.covariance, pulls);
   out.step = -moves.rowwise().sum();
   out.by_noise = out.covariance.diagonal().cwiseSqrt();
   // About their mean: at the solution they sum up to nothing, for what was held they do not.
@@ -133,10 +134,10 @@ void put_intrinsics(const SharedEquations& e, const Part& estimated, std::size_t
   const Part with = solve_for(e, std::move(places));
   camera.intrinsics_change.head(size) = with.step.tail(size);
   // How the mounting moves with the intrinsics that are held.
-  const MatrixXd all_moves = -estimated.covariance * e.information(estimated.places, own);
+  const MatrixXd all_moves = dense::product(-estimated.covariance, e.information(estimated.places, own));
   const MatrixXd moves = all_moves.middleRows<kMountingSize>(estimated.at(all.first));
   camera.by_intrinsics.leftCols(size) = moves;
-  const MatrixXd by_intrinsics = moves * sigma.head(size).cwiseAbs2().asDiagonal() * moves.transpose();
+  const MatrixXd by_intrinsics = dense::compose(moves, sigma.head(size).cwiseAbs2());
   camera.sigma_by_intrinsics = by_intrinsics.diagonal().cwiseSqrt();
   covariance += by_intrinsics;
 }

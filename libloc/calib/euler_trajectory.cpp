@@ -1,6 +1,5 @@
 #include "libloc/calib/euler_trajectory.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -8,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "libloc/calib/dense.hpp"
 #include "libloc/calib/spline_detail.hpp"
 #include "libloc/core/check.hpp"
 #include "libloc/geometry/so3.hpp"
@@ -62,9 +62,8 @@ Eigen::Quaterniond mean_rotation(std::span<const Eigen::Quaterniond> rotations) 
   require(!rotations.empty(), "mean_rotation: no rotations");
   Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
   for (const Eigen::Quaterniond& q : rotations) sum += q.coeffs() * q.coeffs().transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(sum);
   Eigen::Quaterniond mean;
-  mean.coeffs() = solver.eigenvectors().col(3);
+  mean.coeffs() = dense::symmetric_eigen(sum).vectors.col(3);
   if (mean.w() < 0) mean.coeffs() = -mean.coeffs();
   return mean.normalized();
 }

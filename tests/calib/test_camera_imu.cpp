@@ -267,14 +267,14 @@ TEST(CameraImu, IsExactWithoutNoise) {
 }
 
 TEST(CameraImu, ErrorsAreAsLargeAsTheirDeviations) {
-  constexpr int kSeeds = 6;
+  constexpr int kSeeds = 5;
   double nees = 0;
   Vector7d squares = Vector7d::Zero();
   Vector7d variances = Vector7d::Zero();
   for (int seed = 1; seed <= kSeeds; ++seed) {
-    const WavedRig rig = wave({.seconds = 30}, static_cast<std::uint64_t>(seed));
+    const WavedRig rig = wave({.seconds = 20}, static_cast<std::uint64_t>(seed));
     EXPECT_NEAR(rig.turn_rate_rms, 0.9, 0.1);
-    const CameraImuFit fit = calibrate(rig);
+    const CameraImuFit fit = calibrate(rig, {.check_line_delay = false});
     EXPECT_TRUE(fit.converged);
     EXPECT_GT(fit.cameras[0].start.correlation, 0.8);
     const Vector7d error = error_of(fit, rig, 0);
@@ -295,7 +295,7 @@ TEST(CameraImu, ErrorsAreAsLargeAsTheirDeviations) {
 }
 
 TEST(CameraImu, AnyOffsetGivesTheSame) {
-  const WavedRig rig = wave({.seconds = 20}, 4);
+  const WavedRig rig = wave({.seconds = 15}, 4);
   const CameraImuFit here = calibrate(rig);
   for (const double shift : {0.05, -2.0, 3600.0}) {
     WavedRig moved = rig;
@@ -312,12 +312,12 @@ TEST(CameraImu, AnyOffsetGivesTheSame) {
 
 TEST(CameraImu, OutliersAndMissingPicturesDoLittle) {
   for (const bool missing : {false, true}) {
-    WavedRigOptions options{.seconds = 30};
+    WavedRigOptions options{.seconds = 20};
     (missing ? options.missing : options.outliers) = missing ? 0.3 : 0.02;
     double nees = 0;
     for (int seed = 1; seed <= 3; ++seed) {
       const WavedRig rig = wave(options, static_cast<std::uint64_t>(seed));
-      const CameraImuFit fit = calibrate(rig);
+      const CameraImuFit fit = calibrate(rig, {.check_line_delay = false});
       const Vector7d error = error_of(fit, rig, 0);
       nees += error.dot(fit.cameras[0].covariance.ldlt().solve(error));
     }
@@ -335,7 +335,7 @@ TEST(CameraImu, SlowAndShortIsUncertainAndRight) {
     double nees = 0;
     for (int seed = 1; seed <= 3; ++seed) {
       const WavedRig rig = wave(options, static_cast<std::uint64_t>(seed));
-      const CameraImuFit fit = calibrate(rig);
+      const CameraImuFit fit = calibrate(rig, {.check_line_delay = false});
       const Vector7d error = error_of(fit, rig, 0);
       nees += error.dot(fit.cameras[0].covariance.ldlt().solve(error));
       EXPECT_GT(fit.cameras[0].sigma.segment<3>(3).norm(), slow ? 1e-3 : 2e-4);
