@@ -32,7 +32,8 @@ constexpr std::size_t kColumns = 8;   // cells of the image
 constexpr std::size_t kRows = 6;
 constexpr double kSmallPart = 0.25;  // share of the cells
 constexpr double kFairPart = 0.5;
-constexpr double kBesideImage = 1;  // [px] that a corner's place may err
+constexpr double kBesideImage = 1;    // [px] that a corner's place may err
+constexpr double kFewOutside = 0.01;  // share of the corners
 // Median distance of the corners from where the pose has them, which a few wrong corners do not spoil. Good recordings
 // stay near 0.5; a lens without its distortion, or a spacing of the tags that is wrong by a third, gives 2 to 3.
 constexpr double kFairPose = 1;    // [px]
@@ -194,11 +195,13 @@ class Look {
       }
     }
     if (outside > 0) {
-      add(Verdict::kRefused, "camera.outside_image",
-          count_of(outside, "corner") + " of " + std::to_string(all) + " lie outside the image of " +
-              std::to_string(recording_.camera.width_px) + "x" + std::to_string(recording_.camera.height_px) +
-              " px (up to " + number(farthest.x()) + ", " + number(farthest.y()) +
-              "): the camera was calibrated at another resolution.");
+      const bool many = static_cast<double>(outside) > kFewOutside * static_cast<double>(all);
+      add(many ? Verdict::kRefused : Verdict::kFair, "camera.outside_image",
+          count_of(outside, "corner") + " of " + std::to_string(all) + (outside == 1 ? " lies" : " lie") +
+              " outside the image of " + std::to_string(recording_.camera.width_px) + "x" +
+              std::to_string(recording_.camera.height_px) + " px (up to " + number(farthest.x()) + ", " +
+              number(farthest.y()) +
+              "): " + (many ? "the camera was calibrated at another resolution." : "they were placed wrongly."));
     }
     if (const double median = quantile(counts, 0.5); median < kFewCorners) {
       add(Verdict::kFair, "camera.few_corners",

@@ -308,6 +308,8 @@ TEST(CameraImuLint, TheTargetInThePictures) {
       Verdict::kFair, "camera.few_corners", {"no more than 10"});
   expect_only([](Input& in) { in.cameras[0].camera.width_px = 376; }, Verdict::kRefused, "camera.outside_image",
               {"376x480", "another resolution"});
+  expect_only([&](Input& in) { views(in)[7].corners[3].pixel_px.y() = -9; }, Verdict::kFair, "camera.outside_image",
+              {"1 corner of ", " lies outside the image of 752x480", "placed wrongly"});
   // A board far away, in the middle of the image.
   const auto shrink = [&](double share) {
     return [=](Input& in) {
