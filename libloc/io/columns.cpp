@@ -35,9 +35,11 @@ constexpr std::array kTriads{
     std::pair{std::string_view("gyr_"), Quantity::kAngularVelocity},
     std::pair{std::string_view("gyro_"), Quantity::kAngularVelocity},
     std::pair{std::string_view("w_rs_s_"), Quantity::kAngularVelocity},
+    std::pair{std::string_view("omega_"), Quantity::kAngularVelocity},
     std::pair{std::string_view("a"), Quantity::kSpecificForce},
     std::pair{std::string_view("acc_"), Quantity::kSpecificForce},
     std::pair{std::string_view("a_rs_s_"), Quantity::kSpecificForce},
+    std::pair{std::string_view("alpha_"), Quantity::kSpecificForce},  // Kalibr
     std::pair{std::string_view("m"), Quantity::kMagneticField},
     std::pair{std::string_view("mag_"), Quantity::kMagneticField},
     std::pair{std::string_view("p"), Quantity::kPosition},

@@ -309,11 +309,7 @@ TEST(CameraImuLint, TheTargetInThePictures) {
   expect_only([](Input& in) { in.cameras[0].camera.width_px = 376; }, Verdict::kRefused, "camera.outside_image",
               {"376x480", "another resolution"});
   expect_only([&](Input& in) { views(in)[7].corners[3].pixel_px.y() = -9; }, Verdict::kFair, "camera.outside_image",
-<<<<<<< HEAD
-              {"1 corner of ", " lies outside the image of 752x480", "placed wrongly"});
-=======
               {"1 corner of ", " lies outside the image of 752x480", "wrongly placed"});
->>>>>>> a48765b (camera_imu_lint: a few corners beside the image are wrong corners, not another resolution)
   // A board far away, in the middle of the image.
   const auto shrink = [&](double share) {
     return [=](Input& in) {
