@@ -3,8 +3,8 @@
 //
 //   what                  names                                                      units
 //   time                  time, timestamp, t, ts                                     ns, us, ms, s
-//   angular velocity      wx wy wz, gx gy gz, gyr_x.., gyro_x.., w_rs_s_x.., omega_x..          rad/s, deg/s (rad_s, deg_s, dps)
-//   specific force        ax ay az, acc_x.., a_rs_s_x.., alpha_x..                            m/s^2, g, mg (m_s2, g, mg)
+//   angular velocity      wx wy wz, gx gy gz, gyr_x.., gyro_x.., w_rs_s_x.., omega_x.. rad/s, deg/s (rad_s, deg_s, dps)
+//   specific force        ax ay az, acc_x.., a_rs_s_x.., alpha_x..                     m/s^2, g, mg (m_s2, g, mg)
 //   magnetic field        mx my mz, mag_x..                                          T, mT, uT, nT, gauss, mgauss, arb
 //   reference orientation qw qx qy qz, q_rs_w.. (Hamilton, body to world)            none
 //   reference position    px py pz, p_rs_r_x..                                       m

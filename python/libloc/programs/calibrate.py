@@ -24,6 +24,7 @@ import libloc
 from libloc import DataError, Verdict
 from libloc.programs import (
     calibrate_camera,
+    calibrate_camera_imu,
     calibrate_clock,
     calibrate_gps,
     calibrate_inertial,
@@ -140,6 +141,14 @@ def make_parser() -> argparse.ArgumentParser:
     )
     calibrate_camera.add_options(camera)
     _add_output_options(camera)
+    camera_imu = _add_command(
+        commands,
+        "camera-imu",
+        "where cameras sit on the IMU and how their clocks differ, from a target that was waved before them",
+        calibrate_camera_imu.__doc__ or "",
+    )
+    calibrate_camera_imu.add_options(camera_imu)
+    _add_output_options(camera_imu)
     return parser
 
 
@@ -185,6 +194,8 @@ def calibrated(options: argparse.Namespace) -> Outcome:
         return calibrate_gps.calibrate(options)
     if options.command == "camera":
         return calibrate_camera.calibrate(options)
+    if options.command == "camera-imu":
+        return calibrate_camera_imu.calibrate(options)
     return _COMMANDS[options.command][1](read_inputs(options), options)
 
 
@@ -224,6 +235,8 @@ def main(arguments: list[str] | None = None) -> int:
         calibrate_gps.check_options(parser, options)
     elif options.command == "camera":
         calibrate_camera.check_options(parser, options)
+    elif options.command == "camera-imu":
+        calibrate_camera_imu.check_options(parser, options)
     try:
         if options.out is not None and options.out.exists():
             libloc.read_rig(options.out)  # before the work, not after it

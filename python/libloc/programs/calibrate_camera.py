@@ -42,7 +42,7 @@ def _size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def _count(text: str) -> int:
+def count_of(text: str) -> int:
     if not (text.isdigit() and int(text) > 0):
         raise argparse.ArgumentTypeError(f"{text}: must be a positive whole number")
     return int(text)
@@ -61,11 +61,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--size", type=_size, metavar="WxH", help="of the image, for a table of corners [px]")
     group.add_argument(
-        "--step", type=_count, metavar="N", help="search every N-th picture (videos: 500 in all)"
+        "--step", type=count_of, metavar="N", help="search every N-th picture (videos: 500 in all)"
     )
     group.add_argument(
         "--max-views",
-        type=_count,
+        type=count_of,
         default=200,
         metavar="N",
         help="use so many, the most different ones (%(default)s)",
@@ -74,7 +74,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def check_options(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
     try:
-        options.target = _target(options.target)
+        options.target = target_of(options.target)
     except DataError as error:
         parser.error(f"--target: {error}")
     except ValueError as error:
@@ -88,7 +88,7 @@ def check_options(parser: argparse.ArgumentParser, options: argparse.Namespace) 
         )
 
 
-def _target(words: list[str]) -> libloc.CalibrationTarget:
+def target_of(words: list[str]) -> libloc.CalibrationTarget:
     if len(words) == 1 and words[0].lower().endswith((".yaml", ".yml")):
         return libloc.CalibrationTarget.read_kalibr(Path(words[0]))
     return libloc.CalibrationTarget(" ".join(words))

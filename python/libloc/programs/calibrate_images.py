@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -171,7 +172,7 @@ def pictures(inputs: list[Path], camera: int, step: int | None) -> tuple[Iterato
     return stream(), None
 
 
-class _Progress:
+class Progress:
     """One line that is written over; nothing where no one looks on."""
 
     def __init__(self, total: int | None, stream: TextIO) -> None:
@@ -205,7 +206,7 @@ def find_corners(
     """
     detector = libloc.TargetDetector(target)
     out = Corners()
-    progress = _Progress(total, stream or sys.stderr)
+    progress = Progress(total, stream or sys.stderr)
     found: dict[tuple[int, int], list[tuple[str, libloc.TargetDetection]]] = {}
     first: list[Grey] = []
     searched = hits = 0
@@ -231,7 +232,7 @@ def find_corners(
         raise DataError(f"not one picture could be read{why}")
     if hits == 0:
         reasons = [seen.reason for group in found.values() for _, seen in group]
-        hint = _other_target(target, first)
+        hint = other_target(target, first)
         raise DataError(
             f"the target ({target}) is in none of {searched} pictures: "
             f"{max(set(reasons), key=reasons.count)}." + (f" {hint}" if hint else "")
@@ -251,7 +252,7 @@ def find_corners(
     return out
 
 
-def _other_target(target: libloc.CalibrationTarget, some: list[Grey]) -> str:
+def other_target(target: libloc.CalibrationTarget, some: list[Grey]) -> str:
     """The usual mistakes."""
     if target.is_april_grid:
         detector = libloc.TargetDetector(target)
@@ -268,6 +269,13 @@ def _other_target(target: libloc.CalibrationTarget, some: list[Grey]) -> str:
     return ""
 
 
+def _time_of(path: Path, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise DataError(f"{path}: timestamp_ns '{text}' is no number of nanoseconds") from None
+
+
 def read_corner_table(path: Path, target: libloc.CalibrationTarget, width_px: int, height_px: int) -> Corners:
     """Corners of any detector (CSV: timestamp_ns, tag_id and corner_index or corner_id, u_px, v_px).
 
@@ -275,35 +283,40 @@ def read_corner_table(path: Path, target: libloc.CalibrationTarget, width_px: in
     """
     out = Corners(width_px=width_px, height_px=height_px)
     pictures_of: dict[str, list[tuple[int, float, float]]] = {}
+    corner_count = len(target.corners())
     with path.open(encoding="utf-8-sig", newline="") as file:
-        reader = csv.DictReader(file)
-        names = set(reader.fieldnames or ())
-        by_tag = {"tag_id", "corner_index"} <= names
-        if not {"timestamp_ns", "u_px", "v_px"} <= names or not (by_tag or "corner_id" in names):
+        reader = csv.reader(file)
+        names = [name.strip() for name in next(reader, [])]
+        by_tag = {"tag_id", "corner_index"} <= set(names)
+        if not {"timestamp_ns", "u_px", "v_px"} <= set(names) or not (by_tag or "corner_id" in names):
             raise DataError(
                 f"{path}:1: the heading must name timestamp_ns, u_px, v_px, "
                 "and tag_id and corner_index or corner_id"
             )
+        time, u, v = (names.index(name) for name in ("timestamp_ns", "u_px", "v_px"))
+        tag, index = (
+            names.index(name) for name in (("tag_id", "corner_index") if by_tag else ("corner_id",) * 2)
+        )
         for row in reader:
+            if not row:
+                continue
             try:
                 number = (
-                    4 * (int(row["tag_id"]) - target.first_tag) + int(row["corner_index"])
-                    if by_tag
-                    else int(row["corner_id"])
+                    4 * (int(row[tag]) - target.first_tag) + int(row[index]) if by_tag else int(row[index])
                 )
-                corner = (number, float(row["u_px"]), float(row["v_px"]))
-            except (TypeError, ValueError) as error:
+                corner = (number, float(row[u]), float(row[v]))
+            except (IndexError, ValueError) as error:
                 raise DataError(f"{path}:{reader.line_num}: {error}") from None
-            if not (0 <= number < len(target.corners()) and np.isfinite(corner[1:]).all()):
+            if not (0 <= number < corner_count and math.isfinite(corner[1]) and math.isfinite(corner[2])):
                 raise DataError(
                     f"{path}:{reader.line_num}: corner {number} at {corner[1:]} is none of {target}"
                 )
-            pictures_of.setdefault(row["timestamp_ns"], []).append(corner)
+            pictures_of.setdefault(row[time], []).append(corner)
     for name, corners in pictures_of.items():
         corners.sort()
         out.names.append(name)
         ids = np.array([c[0] for c in corners], dtype=np.int64)
-        out.views.append(libloc.TargetView(ids, np.array([c[1:] for c in corners])))
+        out.views.append(libloc.TargetView(ids, np.array([c[1:] for c in corners]), _time_of(path, name)))
     out.counts["pictures.with_target"] = len(out.names)
     if not out.names:
         raise DataError(f"{path}: there are no corners in it")

@@ -1,0 +1,350 @@
+"""What loc-calibrate camera-imu reads: the corners of a target in the pictures of cameras, and an IMU.
+
+Corners come from pictures (EuRoC folder, Kalibr's dataset folder, folder of pictures, video, LCM log) or from
+tables that another detector wrote; the IMU from the same recording or from a file of its own.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+import libloc
+from libloc import DataError
+from libloc.images import PICTURES, number_of_pictures, picture_format, pictures
+from libloc.programs import calibrate_input
+from libloc.programs.calibrate_images import Progress, other_target, read_corner_table
+from libloc.programs.calibrate_input import InputOptions
+
+
+@dataclass
+class CameraInput:
+    """The views of one camera, one for each picture that was searched (or that a table names)."""
+
+    camera: libloc.CameraCalibration
+    views: list[libloc.TargetView] = field(default_factory=list)
+    left_out: int = 0  # corners that were not sharp enough
+    reasons: dict[str, int] = field(default_factory=dict)  # why there were no corners
+
+
+@dataclass
+class CameraImuInput:
+    name: str
+    cameras: list[CameraInput]
+    times_ns: NDArray[np.int64]
+    angular_velocity: NDArray[np.float64]  # (N, 3) [rad/s], corrected by the rig
+    specific_force: NDArray[np.float64]  # (N, 3) [m/s²], likewise
+    noise: libloc.ImuNoise
+    rate_hz: float = 0.0  # nominal; 0: unknown
+    counts: dict[str, int] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    detect_cpu_s: float = 0.0
+    interrupted: bool = False
+
+    def recordings(self) -> list[libloc.CameraRecording]:
+        return [libloc.CameraRecording(c.camera, c.views) for c in self.cameras]
+
+
+@dataclass
+class Sources:
+    """INPUT, sorted by what it is."""
+
+    tables: list[Path] = field(default_factory=list)  # of corners, one a camera
+    pictures: list[tuple[Path, dict[str, Any]]] = field(
+        default_factory=list
+    )  # one a camera: open_pictures(...)
+    imu: Path | None = None
+    folder: Path | None = None  # EuRoC's, which may hold calibrations too
+
+
+def _is_corner_table(path: Path) -> bool:
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        return "u_px" in file.readline()
+
+
+def _kalibr_folder(folder: Path, cameras: list[int]) -> Sources | None:
+    """Kalibr's dataset: cam0/NANOSECONDS.png … and imu0.csv."""
+    if (folder / "mav0").is_dir() or not (folder / "cam0").is_dir() or (folder / "cam0" / "data").is_dir():
+        return None
+    out = Sources(folder=folder, imu=folder / "imu0.csv" if (folder / "imu0.csv").is_file() else None)
+    for camera in cameras:
+        own = folder / f"cam{camera}"
+        if not own.is_dir():
+            raise DataError(f"{folder}: there is no cam{camera} in it")
+        out.pictures.append((own, {"name_unit": "ns"}))
+    return out
+
+
+def sources_of(inputs: list[Path], cameras: list[int], imu: Path | None, name_unit: str) -> Sources:
+    """Raises DataError naming what is missing or too much."""
+    out = Sources()
+    for path in inputs:
+        if path.is_file() and path.suffix.lower() == ".csv":
+            if _is_corner_table(path):
+                out.tables.append(path)
+            elif out.imu is not None:
+                raise DataError(
+                    f"{path}: {out.imu} gives the IMU already, and corners have columns u_px, v_px"
+                )
+            else:
+                out.imu = path
+            continue
+        form = picture_format(path)
+        if form is None:
+            if path.suffix.lower() in PICTURES:
+                raise DataError(f"{path}: single pictures have no times: give their folder")
+            if out.imu is not None:
+                raise DataError(f"{path}: {out.imu} gives the IMU already")
+            out.imu = path
+            continue
+        if out.pictures:
+            raise DataError(f"{path}: {out.pictures[0][0]} gives the pictures already")
+        kalibr = _kalibr_folder(path, cameras) if path.is_dir() else None
+        if kalibr is not None:
+            out.pictures, out.folder = kalibr.pictures, path
+            out.imu = out.imu or kalibr.imu
+            continue
+        how: dict[str, Any] = {}
+        if form == "folder" and not (path / "data.csv").is_file():
+            how = {"name_unit": name_unit}
+        if form in ("euroc", "lcm"):
+            out.imu = out.imu or path
+        if form == "euroc":
+            out.folder = path
+        if form in ("folder", "video") and len(cameras) > 1:
+            raise DataError(f"{path}: holds the pictures of one camera, not of {len(cameras)}")
+        out.pictures = [(path, {**how, "camera": camera}) for camera in cameras]
+    if imu is not None:
+        out.imu = imu
+    if out.tables and out.pictures:
+        raise DataError(f"{out.tables[0]}: corners, and {out.pictures[0][0]} gives pictures: one of them")
+    if not out.tables and not out.pictures:
+        raise DataError("there are neither pictures nor a table of corners (CSV with u_px, v_px) in INPUT")
+    if out.imu is None:
+        raise DataError("there is no IMU in INPUT: name its CSV behind the pictures, or with --imu")
+    if out.tables and len(out.tables) != len(cameras):
+        raise DataError(
+            f"{len(out.tables)} tables of corners for {len(cameras)} cameras: name the cameras with --camera"
+        )
+    return out
+
+
+def _of_folder(folder: Path, name: str) -> Path | None:
+    for part in (folder / "mav0", folder):
+        if (part / name / "sensor.yaml").is_file():
+            return part / name / "sensor.yaml"
+    return None
+
+
+def read_rig(paths: list[Path], folder: Path | None, cameras: list[int]) -> libloc.Rig:
+    """The rig of all files that were named, or of an EuRoC folder itself. Raises DataError."""
+    rig = libloc.Rig()
+    if not paths and folder is not None:
+        names = [f"cam{camera}" for camera in cameras]
+        paths = [found for name in [*names, "imu0"] if (found := _of_folder(folder, name)) is not None]
+        found_cameras = [libloc.read_any_rig(p) for p in paths]
+        rig.cameras = [camera for part in found_cameras for camera in part.cameras]
+        for part in found_cameras:
+            rig.imu = part.imu or rig.imu
+        return rig
+    for path in paths:
+        part = libloc.read_any_rig(path)
+        if part.cameras:
+            if rig.cameras:
+                raise DataError(f"{path}: the cameras are in another file already")
+            rig.cameras = part.cameras
+        if part.imu is not None:
+            if rig.imu is not None:
+                raise DataError(f"{path}: the IMU is in another file already")
+            rig.imu = part.imu
+    return rig
+
+
+def cameras_of(rig: libloc.Rig, numbers: list[int], from_folder: bool) -> list[libloc.CameraCalibration]:
+    """Those of the rig, by their place in it. Raises DataError when there is none."""
+    out = []
+    for at, number in enumerate(numbers):
+        place = at if from_folder else number
+        if place >= len(rig.cameras):
+            raise DataError(
+                f"the rig has {len(rig.cameras)} cameras, none with number {number}: name a file with its "
+                "intrinsics (--rig; loc-calibrate camera finds them)"
+            )
+        out.append(rig.cameras[place])
+    return out
+
+
+def find_views(
+    target: libloc.CalibrationTarget,
+    source: tuple[Path, dict[str, Any]],
+    camera: libloc.CameraCalibration,
+    step: int,
+    counts: dict[str, int],
+    stream: TextIO | None = None,
+) -> tuple[CameraInput, bool]:
+    """Searches the pictures of one camera; Ctrl-C goes on with those that were searched (True).
+
+    Raises DataError when no picture shows the target, or they have another size than the camera.
+    """
+    if not libloc.HAS_VISION:
+        raise DataError("this libloc was built without OpenCV and cannot look at pictures")
+    path, how = source
+    detector = libloc.TargetDetector(target)
+    out = CameraInput(camera)
+    opened = libloc.open_pictures(path, **how)
+    number = how.get("camera", 0)
+    progress = Progress(number_of_pictures(path, number), stream or sys.stderr)
+    first: list[NDArray[np.uint8]] = []
+    interrupted = False
+    done = hits = 0
+    try:
+        for time_ns, picture in pictures(opened, number):
+            done += 1
+            if (done - 1) % step:
+                continue
+            height, width = picture.shape
+            if (width, height) != (camera.width_px, camera.height_px):
+                raise DataError(
+                    f"{path}: a picture of {width} x {height} pixels; {camera.name} of the rig has "
+                    f"{camera.width_px} x {camera.height_px}: intrinsics hold for one size only"
+                )
+            seen = detector.detect(picture)
+            out.left_out += seen.corners_left_out
+            out.views.append(libloc.TargetView(seen.view.ids, seen.view.pixels_px, time_ns))
+            if len(seen.view):
+                hits += 1
+            else:
+                out.reasons[seen.reason] = out.reasons.get(seen.reason, 0) + 1
+            if len(first) < 4:
+                first.append(picture)
+            progress.show(done, hits)
+    except KeyboardInterrupt:
+        interrupted = True
+    progress.end()
+    counts[f"{camera.name}.pictures.searched"] = len(out.views)
+    counts[f"{camera.name}.pictures.with_target"] = hits
+    for name, count in opened.counts().items():
+        if "skip" in name or "damaged" in name:
+            counts[f"{camera.name}.{name}"] = count
+    if hits == 0:
+        if not out.views:
+            raise DataError(f"{path}: there are no pictures of camera {number} in it")
+        hint = other_target(target, first)
+        raise DataError(
+            f"{path}: the target ({target}) is in none of {len(out.views)} pictures: "
+            f"{max(out.reasons, key=lambda r: out.reasons[r])}." + (f" {hint}" if hint else "")
+        )
+    return out, interrupted
+
+
+def corrected(
+    rig: libloc.Rig, gyro: NDArray[np.float64], accel: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Readings as the rig's calibration of the IMU corrects them."""
+    if rig.imu is None:
+        return np.ascontiguousarray(gyro), np.ascontiguousarray(accel)
+    g, a = rig.imu.gyroscope, rig.imu.accelerometer
+    return (
+        np.ascontiguousarray((gyro - g.bias) @ np.asarray(g.matrix).T),
+        np.ascontiguousarray((accel - a.bias) @ np.asarray(a.matrix).T),
+    )
+
+
+def _read_imu(path: Path, options: InputOptions, notes: list[str]) -> calibrate_input.Readings:
+    try:
+        return calibrate_input.read_readings(path, "gyroscope", options)
+    except DataError as error:
+        if "has no unit" not in str(error) and "state it in the options" not in str(error):
+            raise
+    # Kalibr's files name no units. They are looked at against the pictures before anything is solved.
+    usual = InputOptions(
+        columns=options.columns,
+        time_unit=options.time_unit or "ns",
+        gyroscope_unit=options.gyroscope_unit or "rad/s",
+        accelerometer_unit=options.accelerometer_unit or "m/s^2",
+        rate_hz=options.rate_hz,
+    )
+    readings = calibrate_input.read_readings(path, "gyroscope", usual)
+    notes.append(
+        f"{path.name} names not all units: {usual.time_unit}, {usual.gyroscope_unit} and "
+        f"{usual.accelerometer_unit} were taken"
+    )
+    return readings
+
+
+def noise_of(rig: libloc.Rig, notes: list[str]) -> libloc.ImuNoise:
+    if rig.imu is None:
+        notes.append(
+            "the rig says nothing of the IMU's noise: that of a usual MEMS IMU was taken "
+            "(--rig with an imu block, or Kalibr's imu.yaml beside it; loc-calibrate imu-noise measures it)"
+        )
+        return libloc.ImuNoise()
+    return rig.imu.noise
+
+
+def read_input(
+    inputs: list[Path],
+    cameras: list[int],
+    rigs: list[Path],
+    imu: Path | None,
+    target: libloc.CalibrationTarget,
+    text: InputOptions,
+    name_unit: str = "ns",
+    step: int = 1,
+    stream: TextIO | None = None,
+) -> CameraImuInput:
+    """Reads and searches everything. Raises DataError naming file, line, field and value."""
+    sources = sources_of(inputs, cameras, imu, name_unit)
+    rig = read_rig(rigs, sources.folder, cameras)
+    calibrations = cameras_of(rig, cameras, from_folder=not rigs)
+    notes: list[str] = []
+    counts: dict[str, int] = {}
+    assert sources.imu is not None
+    readings = _read_imu(sources.imu, text, notes)
+    gyro, times = readings.need_times("gyroscope")
+    accel = readings.need("accelerometer")
+    if len(gyro) != len(accel):
+        raise DataError(
+            f"{sources.imu}: {len(gyro)} readings of the gyroscope and {len(accel)} of the accelerometer"
+        )
+    begin = time.process_time()
+    found: list[CameraInput] = []
+    interrupted = False
+    if sources.tables:
+        for path, camera in zip(sources.tables, calibrations, strict=True):
+            table = read_corner_table(path, target, camera.width_px, camera.height_px)
+            found.append(CameraInput(camera, table.views))
+            counts[f"{camera.name}.pictures.with_target"] = len(table.views)
+    else:
+        for source, camera in zip(sources.pictures, calibrations, strict=True):
+            views, stopped = find_views(target, source, camera, step, counts, stream)
+            found.append(views)
+            interrupted = interrupted or stopped
+    if interrupted:
+        notes.append("interrupted: the rest of the pictures was not searched")
+    for camera_input in found:
+        if camera_input.left_out:
+            notes.append(
+                f"{camera_input.left_out} corners of {camera_input.camera.name} were not sharp enough"
+            )
+    counts |= {name: n for name, n in readings.counts.items() if name.startswith("imu.")}
+    rates, forces = corrected(rig, gyro.rows, accel.rows)
+    return CameraImuInput(
+        name=", ".join(path.name for path in inputs),
+        cameras=found,
+        times_ns=times,
+        angular_velocity=rates,
+        specific_force=forces,
+        noise=noise_of(rig, notes),
+        rate_hz=rig.imu.rate_hz if rig.imu is not None else 0.0,
+        counts=counts,
+        notes=notes,
+        detect_cpu_s=time.process_time() - begin,
+        interrupted=interrupted,
+    )
