@@ -184,6 +184,7 @@ void bind_detector(py::module_& m) {
           "detect",
           [](const TargetDetector& self, const py::array& image) {
             const loc::ImageMeasurement picture = image_from(image);
+            const py::gil_scoped_release no_gil;
             return self.detect(picture);
           },
           py::arg("image"), "image: uint8, (height, width) or (height, width, 3) with blue first.");

@@ -34,6 +34,7 @@ import numpy as np
 import libloc
 from libloc import DataError, Verdict
 from libloc.programs import calibrate_camera_imu_input as reading
+from libloc.programs import calibrate_camera_imu_live as live
 from libloc.programs.calibrate_camera import count_of, target_of
 from libloc.programs.calibrate_camera_imu_input import CameraImuInput
 from libloc.programs.calibrate_input import InputOptions
@@ -59,7 +60,7 @@ def _gravity(text: str) -> float | None:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("input", type=Path, nargs="+", metavar="INPUT", help="see above")
+    parser.add_argument("input", type=Path, nargs="*", metavar="INPUT", help="see above")
     group = parser.add_argument_group("target, cameras, IMU")
     group.add_argument("--target", nargs="+", required=True, metavar="WORD", help="see above")
     group.add_argument(
@@ -121,12 +122,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--time-limit", type=_positive, metavar="S", help="of the solution: the best so far then"
     )
+    live.add_options(parser)
     parser.add_argument_group("result").add_argument(
         "--camchain", type=Path, metavar="FILE", help="also write Kalibr's camchain.yaml"
     )
 
 
 def check_options(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    if options.live == bool(options.input):
+        parser.error("INPUT or --live, one of them")
+    if options.live and (len(options.camera) > 1 or not options.rig):
+        parser.error("--live is for one camera, and needs its intrinsics (--rig)")
     try:
         options.target = target_of(options.target)
     except DataError as error:
@@ -446,10 +452,41 @@ def solve(data: CameraImuInput, options: argparse.Namespace) -> Outcome:
     return outcome_of(data, fit, options, lint)
 
 
-def calibrate(options: argparse.Namespace) -> Outcome:
-    """Reads and calibrates. Raises DataError for data that cannot be calibrated."""
-    begin = time.monotonic()
-    data = reading.read_input(
+def _collect(options: argparse.Namespace) -> CameraImuInput:
+    rig = reading.read_rig(options.rig, None, options.camera)
+    (camera,) = reading.cameras_of(rig, options.camera, from_folder=False)
+    notes: list[str] = []
+    noise = reading.noise_of(rig, notes)
+
+    def quick(so_far: live.Collected) -> libloc.CameraImuFit:
+        rates, forces = reading.corrected(rig, so_far.angular_velocity, so_far.specific_force)
+        return libloc.calibrate_camera_imu(
+            options.target,
+            [libloc.CameraRecording(camera, so_far.views)],
+            so_far.imu_times_ns,
+            rates,
+            forces,
+            noise,
+            libloc.CameraImuOptions(adapt_noise=False, check_line_delay=False),
+        )
+
+    found = live.collect(options, options.target, camera, quick)
+    rates, forces = reading.corrected(rig, found.angular_velocity, found.specific_force)
+    return CameraImuInput(
+        name=found.name,
+        cameras=[reading.CameraInput(camera, found.views, found.left_out, dict(found.reasons))],
+        times_ns=found.imu_times_ns,
+        angular_velocity=rates,
+        specific_force=forces,
+        noise=noise,
+        rate_hz=rig.imu.rate_hz if rig.imu is not None else 0.0,
+        counts=dict(found.counts),
+        notes=notes,
+    )
+
+
+def _read(options: argparse.Namespace) -> CameraImuInput:
+    return reading.read_input(
         options.input,
         options.camera,
         options.rig,
@@ -463,6 +500,12 @@ def calibrate(options: argparse.Namespace) -> Outcome:
         options.name_unit,
         options.step,
     )
+
+
+def calibrate(options: argparse.Namespace) -> Outcome:
+    """Reads and calibrates. Raises DataError for data that cannot be calibrated."""
+    begin = time.monotonic()
+    data = _collect(options) if options.live else _read(options)
     outcome = solve(data, options)
     outcome.facts.append(("time", f"{time.monotonic() - begin:.1f} s in all"))
     return outcome

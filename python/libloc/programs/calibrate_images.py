@@ -58,7 +58,7 @@ def _of_file(path: Path) -> Grey:
         raise DataError(f"{path}: is no picture, or a damaged one: {error}") from None
 
 
-def _of_message(message: Any, where: str) -> Grey:
+def of_message(message: Any, where: str) -> Grey:
     """A loc.image_t."""
     data = bytes(message.data)
     if message.pixelformat == message.PIXEL_FORMAT_MJPEG:
@@ -125,7 +125,7 @@ def _log(path: Path, camera: int, step: int) -> Iterator[Item]:
         if number % step == 0:
             name = f"{path.name}:{event.event_number}"
             try:
-                yield name, _of_message(event.message, f"{path}: event {event.event_number}")
+                yield name, of_message(event.message, f"{path}: event {event.event_number}")
             except DataError as error:
                 yield name, error
         number += 1
