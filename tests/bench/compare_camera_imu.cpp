@@ -79,7 +79,13 @@ CameraImuFit calibrate(const WavedRig& rig, const CameraImuOptions& options, con
 
 // The same reason has other figures every time.
 std::string kind_of(const std::string& reason) {
-  return reason.substr(0, std::min<std::size_t>(reason.size(), 150));
+  std::string out;
+  for (const char c : reason.substr(0, std::min<std::size_t>(reason.size(), 150))) {
+    const bool figure = (c >= '0' && c <= '9') || (c == '.' && out.ends_with('#'));
+    if (!figure) out += c;
+    if (figure && !out.ends_with('#')) out += '#';
+  }
+  return out;
 }
 
 void add(const Row& row, const WavedRig& rig, const CameraImuFit& fit, Sums& sums) {
@@ -353,10 +359,10 @@ void same_optimum(const bench::RowChoice& choice, BarTable& table) {
 }
 
 void without_loss(int seeds) {
-  Row row = with("outliers of 20 px, 2 %, without loss", seeds, [](Row& r) {
+  Row row = with("outliers of 20 px, 2 %, without loss, noise as given", seeds, [](Row& r) {
     r.rig.outliers = 0.02;
     r.options.loss_sigmas = 1e6;
-    r.may_fail = true;
+    r.options.adapt_noise = false;  // it would make the deviations larger instead
   });
   std::printf("%s (for comparison; no bar)\n", row.name.c_str());
   Sums sums;
@@ -365,6 +371,7 @@ void without_loss(int seeds) {
     add(row, rig, calibrate(rig, row.options, row.rig.noise), sums);
   }
   BarTable::figure("mean NEES (7)", sums.nees / sums.mountings);
+  BarTable::figure("rms of the translation [mm]", 1e3 * std::sqrt(sums.square.segment<3>(3).sum() / sums.mountings));
 }
 
 int run(const bench::RowChoice& choice) {
