@@ -172,7 +172,7 @@ def plot_reprojection(camera: libloc.CameraImuCamera) -> Figure:
         aspect="equal",
         xlabel="u [px]",
         ylabel="v [px]",
-        title=f"means (red) and some residuals, {factor:g} times enlarged",
+        title=f"medians (red) and some residuals, {factor:g} times enlarged",
     )
     thin = _thin(len(residuals))
     scatter.plot(*(residuals / sigma[:, None])[thin].T, ".", ms=1.5, color=USED, alpha=0.4)
@@ -190,16 +190,21 @@ def plot_reprojection(camera: libloc.CameraImuCamera) -> Figure:
     radius = np.hypot(*(pixels - camera.camera.intrinsics_px[2:]).T)
     edges = np.linspace(0, max(float(radius.max(initial=0)), 1.0), 13)
     ring = np.clip(np.digitize(radius, edges) - 1, 0, 11)
-    rms = [np.sqrt(np.mean(lengths[ring == k] ** 2) / 2) if (ring == k).any() else np.nan for k in range(12)]
-    radial.plot((edges[:-1] + edges[1:]) / 2, rms, "o-", color=USED)
-    radial.set(xlabel="from the principal point [px]", ylabel="rms of a coordinate [px]", ylim=(0, None))
+    # Half of the distances are below 1.177 sigma, whatever the few are that are far off.
+    sigmas = [np.median(lengths[ring == k]) / 1.177 if (ring == k).sum() >= 10 else np.nan for k in range(12)]
+    radial.plot((edges[:-1] + edges[1:]) / 2, sigmas, "o-", color=USED)
+    radial.set(
+        xlabel="from the principal point [px]",
+        ylabel="sigma of a coordinate, by the median [px]",
+        ylim=(0, None),
+    )
     for axes in (scatter, radial):
         axes.grid(alpha=0.3)
     return figure
 
 
 def _draw_cells(axes: Axes, pixels: Array, residuals: Array, factor: float, size: tuple[int, int]) -> None:
-    """Some arrows, and the mean of each cell of the image."""
+    """Some arrows, and the median of each cell of the image."""
     if len(pixels) == 0:
         return
     style = {"angles": "xy", "scale_units": "xy", "scale": 1}
@@ -208,12 +213,12 @@ def _draw_cells(axes: Axes, pixels: Array, residuals: Array, factor: float, size
     cell = (pixels / size * (16, 10)).astype(int).clip(0, (15, 9)) @ (1, 16)
     for k in np.unique(cell):
         inside = cell == k
-        if inside.sum() < 10:
+        if inside.sum() < 30:
             continue
         start = pixels[inside].mean(axis=0)
-        mean = 3 * factor * np.median(residuals[inside], axis=0)
-        axes.quiver(*start, *mean, width=0.003, color=DROPPED, **style)
-    axes.text(0.01, 0.01, "means three times more", transform=axes.transAxes, fontsize=8, color=DROPPED)
+        median = 3 * factor * np.median(residuals[inside], axis=0)
+        axes.quiver(*start, *median, width=0.003, color=DROPPED, **style)
+    axes.text(0.01, 0.01, "medians three times more", transform=axes.transAxes, fontsize=8, color=DROPPED)
 
 
 def plot_views(camera: libloc.CameraImuCamera, seconds: Array | None) -> Figure:
