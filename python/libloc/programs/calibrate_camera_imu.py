@@ -35,6 +35,7 @@ import libloc
 from libloc import DataError, Verdict
 from libloc.programs import calibrate_camera_imu_input as reading
 from libloc.programs import calibrate_camera_imu_live as live
+from libloc.programs import calibrate_plots_camera_imu as plots
 from libloc.programs.calibrate_camera import count_of, target_of
 from libloc.programs.calibrate_camera_imu_input import CameraImuInput
 from libloc.programs.calibrate_input import InputOptions
@@ -425,6 +426,9 @@ def outcome_of(
         apply=partial(_apply, fit, options.refine_intrinsics),
         facts=_facts(data, fit),
         tables=tables,
+        pictures=plots.pictures(
+            fit, data.recordings(), (data.times_ns, data.angular_velocity, data.specific_force)
+        ),
         notes=notes,
         counts=data.counts | {name: count for name, count in fit.counts.items() if count},
     )
