@@ -98,3 +98,37 @@ def test_slam_from_images(tmp_path):
     assert (tmp_path / "slam.png").stat().st_size > 50_000
     source = (EXAMPLES / "04_slam_from_images.py").read_text()
     assert source.count("\n") <= 40
+
+
+def test_calibrating_camera_and_imu(tmp_path):
+    text = run("05_camera_imu_calibration.py", "--output", tmp_path)
+    assert "verdict: ok" in text
+    assert float(text.split("error of the turn: ")[1].split()[0]) < 0.05
+    assert float(text.split("error of the translation: ")[1].split()[0]) < 1.5
+    assert float(text.split("error of the offset: ")[1].split()[0]) < 100
+    assert (tmp_path / "camera_imu.png").stat().st_size > 10_000
+
+
+def test_calibrating_camera_and_imu_from_files(tmp_path):
+    from runpy import run_path
+
+    example = run_path(str(EXAMPLES / "05_camera_imu_calibration.py"))
+    _, recording, stamps, gyro, force = example["waved_rig"]()
+    lines = [
+        f"{view.time_ns},{i},{u},{v}"
+        for view in recording.views
+        for i, (u, v) in zip(view.ids, view.pixels_px, strict=True)
+    ]
+    (tmp_path / "corners.csv").write_text("\n".join(["timestamp_ns,id,u_px,v_px", *lines]) + "\n")
+    heading = "time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
+    rows = [",".join(map(str, (t, *w, *f))) for t, w, f in zip(stamps, gyro, force, strict=True)]
+    (tmp_path / "imu.csv").write_text("\n".join([heading, *rows]) + "\n")
+    rig = libloc.Rig()
+    rig.cameras = [recording.camera]
+    libloc.write_rig(tmp_path / "rig.yaml", rig)
+    files = (tmp_path / "corners.csv", tmp_path / "imu.csv", "--target", "checkerboard 9x6 0.04")
+    more = ("--rig", tmp_path / "rig.yaml", "--output", tmp_path)
+    text = run("05_camera_imu_calibration.py", *files, *more)
+    assert float(text.split("offset: ")[1].split()[0]) == pytest.approx(12300, abs=100)
+    absent = (tmp_path / "absent.csv", *files[1:])
+    assert "absent.csv" in run("05_camera_imu_calibration.py", *absent, *more, code=1)
