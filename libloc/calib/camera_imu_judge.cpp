@@ -145,6 +145,22 @@ void put_intrinsics(const SharedEquations& e, const Part& estimated, std::size_t
 void judge_camera(const CameraImuOptions& options, const CameraImuCamera& camera, double length_s, bool several,
                   Quality& q) {
   const std::string of = several ? " of " + camera.camera.name : "";
+  // First what was held wrongly: it spoils all that follows.
+  const CameraImuCheck& line = camera.line_delay_s;
+  const double readout = std::abs(line.value) * camera.camera.height_px;
+  if (!line.estimated && std::abs(line.value) > kSignificant * line.sigma && readout > kRollingShutter) {
+    q.lower_to(Verdict::kWarn,
+               "The rows" + of + " seem to be taken one after the other, " +
+                   to_text(1e3 * line.value * camera.camera.height_px, 2) +
+                   " ms from the first to the last: a rolling shutter. Let the line delay be estimated.");
+  }
+  const CameraImuCheck& drift = camera.offset_drift;
+  if (!drift.estimated && std::abs(drift.value) > kSignificant * drift.sigma &&
+      std::abs(drift.value) * length_s > kDrift) {
+    q.lower_to(Verdict::kWarn, "The clocks" + of + " drift apart by " + to_text(1e6 * drift.value, 2) +
+                                   " us a second: the offset holds for the middle of the recording only. Put both on "
+                                   "one clock, or let the drift be estimated.");
+  }
   const auto by_size = [&](double value, double fair, double warn, double refused, const std::string& text) {
     if (value < fair) return;
     const Verdict verdict = value < warn ? Verdict::kFair : value < refused ? Verdict::kWarn : Verdict::kRefused;
@@ -170,21 +186,6 @@ void judge_camera(const CameraImuOptions& options, const CameraImuCamera& camera
     q.lower_to(Verdict::kFair, "Parts of the recording" + of + " pull apart " + to_text(blocks, 2) +
                                    " times more than noise can (blurred pictures, the lens at the image's edge, "
                                    "coloured residuals of the IMU); the deviations take that into account.");
-  }
-  const CameraImuCheck& line = camera.line_delay_s;
-  const double readout = std::abs(line.value) * camera.camera.height_px;
-  if (!line.estimated && std::abs(line.value) > kSignificant * line.sigma && readout > kRollingShutter) {
-    q.lower_to(Verdict::kWarn,
-               "The rows" + of + " seem to be taken one after the other, " +
-                   to_text(1e3 * line.value * camera.camera.height_px, 2) +
-                   " ms from the first to the last: a rolling shutter. Let the line delay be estimated.");
-  }
-  const CameraImuCheck& drift = camera.offset_drift;
-  if (!drift.estimated && std::abs(drift.value) > kSignificant * drift.sigma &&
-      std::abs(drift.value) * length_s > kDrift) {
-    q.lower_to(Verdict::kWarn, "The clocks" + of + " drift apart by " + to_text(1e6 * drift.value, 2) +
-                                   " us a second: the offset holds for the middle of the recording only. Put both on "
-                                   "one clock, or let the drift be estimated.");
   }
   const double pull = camera.intrinsics_change.head<4>().cwiseAbs().maxCoeff();
   if (!options.refine_intrinsics && pull > kIntrinsicsPull &&

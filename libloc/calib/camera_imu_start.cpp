@@ -203,6 +203,18 @@ Wahba solve_wahba(const std::vector<Turn>& turns, const MeanRate& gyro, double o
   return out;
 }
 
+// Deviation of the turn rate, all axes together.
+double turning_of(std::span<const ImuRow> imu) {
+  Vector3d sum = Vector3d::Zero();
+  double squares = 0;
+  for (const ImuRow& row : imu) {
+    sum += row.gyro;
+    squares += row.gyro.squaredNorm();
+  }
+  const auto n = static_cast<double>(imu.size());
+  return std::sqrt(std::max(0.0, squares / n - (sum / n).squaredNorm()));
+}
+
 }  // namespace
 
 MeanRate::MeanRate(std::span<const ImuRow> imu) {
@@ -274,6 +286,12 @@ StartResult find_start(std::span<const CameraPoseSample> poses, std::span<const 
     weights = std::move(own);
   }
   if (peak.correlation < 0) {
+    const double turning = turning_of(imu);
+    if (turning < kLeastExcitation) {
+      return {{},
+              "The rig does not turn (deviation of the turn rate " + to_text(turning, 2) +
+                  " rad/s): turn it briskly about all three axes."};
+    }
     return {{},
             "Camera and gyroscope do not turn alike at any offset of their clocks (correlation " +
                 to_text(peaks.empty() ? 0 : std::max(peaks.front().correlation, 0.0), 2) + ", " +

@@ -40,7 +40,8 @@ struct RowChoice {
   std::vector<std::string> only;
   int seeds = 0;  ///< 0: each row's own
 
-  RowChoice(int argc, char** argv) {
+  /// @param rows all that there are: a word that is in none of them is a mistake
+  RowChoice(int argc, char** argv, const std::vector<std::string>& rows) {
     for (int i = 1; i < argc; ++i) {
       const std::string text = argv[i];
       if (text.starts_with("--only=")) {
@@ -54,6 +55,11 @@ struct RowChoice {
         if (seeds <= 0) throw std::invalid_argument("'" + text + "': a number of at least 1 is needed");
       } else {
         throw std::invalid_argument("'" + text + "': only --only=WORD,… and --seeds=N are known");
+      }
+    }
+    for (const std::string& word : only) {
+      if (std::ranges::none_of(rows, [&](const std::string& row) { return row.find(word) != std::string::npos; })) {
+        throw std::invalid_argument("'" + word + "' is no row");
       }
     }
   }

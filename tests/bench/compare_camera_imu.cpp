@@ -393,7 +393,10 @@ int run(const bench::RowChoice& choice) {
 
 int main(int argc, char** argv) {
   try {
-    return loc::run(loc::bench::RowChoice(argc, argv));
+    return loc::run(loc::bench::RowChoice(
+        argc, argv,
+        {"nominal", "exact", "offset", "start", "order", "angles", "outliers", "motion", "short", "axis", "still",
+         "view", "missing", "cameras", "line", "drift", "matrices", "gravity", "intrinsics"}));
   } catch (const std::exception& error) {
     std::fprintf(stderr, "compare_camera_imu: %s\n", error.what());
     return 2;

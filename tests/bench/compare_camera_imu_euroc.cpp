@@ -291,7 +291,7 @@ int run(const bench::RowChoice& choice) {
 
 int main(int argc, char** argv) {
   try {
-    return loc::run(loc::bench::RowChoice(argc, argv));
+    return loc::run(loc::bench::RowChoice(argc, argv, {"whole", "shift", "thirds", "options"}));
   } catch (const std::exception& error) {
     std::fprintf(stderr, "compare_camera_imu_euroc: %s\n", error.what());
     return 2;

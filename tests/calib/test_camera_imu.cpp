@@ -430,8 +430,7 @@ TEST(CameraImu, RollingShutterIsToldAndEstimated) {
   EXPECT_FALSE(told.line_delay_s.estimated);
   EXPECT_NEAR(told.line_delay_s.value, delay, 0.5 * delay);  // one step only
   EXPECT_GE(held.quality.verdict, Verdict::kWarn);
-  EXPECT_TRUE(std::ranges::any_of(held.quality.reasons,
-                                  [](const std::string& r) { return r.find("rolling shutter") != std::string::npos; }));
+  EXPECT_NE(held.quality.reasons.front().find("rolling shutter"), std::string::npos);
   const CameraImuFit fit = calibrate(rig, {.estimate_line_delay = true});
   const CameraImuCheck& line = fit.cameras[0].line_delay_s;
   EXPECT_TRUE(line.estimated);
@@ -449,6 +448,7 @@ TEST(CameraImu, DriftOfTheClocksIsToldAndEstimated) {
   EXPECT_FALSE(told.estimated);
   EXPECT_NEAR(told.value, drift, 5 * told.sigma);
   EXPECT_EQ(held.quality.verdict, Verdict::kWarn);
+  EXPECT_NE(held.quality.reasons.front().find("drift apart"), std::string::npos);
   const CameraImuFit fit = calibrate(rig, {.estimate_drift = true});
   EXPECT_NEAR(fit.cameras[0].offset_drift.value, drift, 4 * fit.cameras[0].offset_drift.sigma);
   EXPECT_LT(in_sigmas(error_of(fit, rig, 0), fit.cameras[0]).cwiseAbs().maxCoeff(), 4);
@@ -589,7 +589,7 @@ TEST(CameraImu, WhatCannotBeSaysWhy) {
     expect_data_error([&] { calibrate(rig); }, parts);
   };
   refused({.seconds = 20, .turning = {1, 0, 0}}, {"one axis", "all three"});
-  refused({.seconds = 20, .turning = {0, 0, 0}}, {"do not turn alike"});
+  refused({.seconds = 20, .turning = {0, 0, 0}}, {"does not turn"});
   refused({.seconds = 20, .missing = 1}, {"too few pictures"});
   WavedRig other = wave({.seconds = 20}, 1);
   other.imu = wave({.seconds = 20}, 7).imu;
