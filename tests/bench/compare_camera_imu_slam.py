@@ -3,8 +3,10 @@ calibration finds it in EuRoC's recording of an AprilGrid; and with only the tur
 
     python tests/bench/compare_camera_imu_slam.py [--data FOLDER]
 
-FOLDER: holds euroc-v101-tracks and euroc-cam-imu-calibration (default: $LIBLOC_DATA). Exit code 1: beyond a
-bar. SLAM begins at several times, for one ATE is luck by some millimetres; bars are for the whole recording.
+FOLDER: holds euroc-v101-tracks and euroc-cam-imu-calibration (default: $LIBLOC_DATA). One ATE is luck by some
+millimetres, so SLAM begins at several times; the place that Basalt publishes for this rig stands beside it. Exit
+code 1: on average the calibrated mounting is worse by more than two standard errors, or the whole recording is
+beyond its bar.
 """
 
 import argparse
@@ -19,9 +21,9 @@ import libloc
 sys.path.insert(0, str(Path(__file__).parent))
 import compare_slam
 
-ATE_BAR_M = 0.025
-BEGINS_S = (0, 2, 4, 6, 8)
-WORSE_BAR_M = 0.002  # what the noise of one run is worth
+ATE_BAR_MM = 25
+BEGINS_S = range(8)
+BASALT = (-0.01677, -0.06894, 0.00514)  # its translation of T_imu_camera [m]
 
 
 def calibrated(folder: Path) -> libloc.CameraImuCamera:
@@ -86,18 +88,21 @@ def main() -> int:
         "calibrated": (calibration, found.time_offset_s),
         "its turn only": (libloc.Pose3(calibration.rotation_wxyz, euroc.translation), 0.0),
         "its place only": (libloc.Pose3(euroc.rotation_wxyz, calibration.translation), 0.0),
+        "Basalt's place": (libloc.Pose3(euroc.rotation_wxyz, BASALT), 0.0),
     }
     print("ATE [mm] by begin [s]   " + "".join(f"{begin:8d}" for begin in BEGINS_S) + "    mean")
     ates = []
     for name, (T_body_camera, offset_s) in mountings.items():
         row = [1e3 * ate(tracks, truth, begin, T_body_camera, offset_s) for begin in BEGINS_S]
         print(f"  {name:22s}" + "".join(f"{value:8.2f}" for value in row) + f"{np.mean(row):8.2f}")
-        ates.append(1e-3 * row[0])
-    worse = ates[1] - ates[0]
-    ok = ates[1] <= ATE_BAR_M and worse <= WORSE_BAR_M
+        ates.append(row)
+    worse = np.array(ates[1]) - ates[0]
+    mean, error = worse.mean(), worse.std(ddof=1) / np.sqrt(len(worse))
+    ok = ates[1][0] <= ATE_BAR_MM and mean <= 2 * error
     print(
-        f"calibrated less EuRoC's: {1e3 * worse:+.2f} mm; bars: ATE {1e3 * ATE_BAR_M:.0f} mm, "
-        f"{1e3 * WORSE_BAR_M:.0f} mm worse: {'ok' if ok else 'FAILED'}"
+        f"calibrated less EuRoC's: {mean:+.2f} mm on average (standard error {error:.2f}), "
+        f"{worse[0]:+.2f} mm from the first frame; bars: {ATE_BAR_MM} mm from the first frame, on average not "
+        f"worse by two standard errors: {'ok' if ok else 'FAILED'}"
     )
     return 0 if ok else 1
 
