@@ -4,9 +4,9 @@ calibration finds it in EuRoC's recording of an AprilGrid; and with only the tur
     python tests/bench/compare_camera_imu_slam.py [--data FOLDER]
 
 FOLDER: holds euroc-v101-tracks and euroc-cam-imu-calibration (default: $LIBLOC_DATA). One ATE is luck by some
-millimetres, so SLAM begins at several times; the place that Basalt publishes for this rig stands beside it. Exit
-code 1: on average the calibrated mounting is worse by more than two standard errors, or the whole recording is
-beyond its bar.
+millimetres, so SLAM begins at several times; the place that Basalt publishes for this rig stands beside it.
+Exit code 1: on average the calibrated mounting is worse by more than two standard errors, or the whole
+recording is beyond its bar.
 """
 
 import argparse
@@ -101,8 +101,8 @@ def main() -> int:
     ok = ates[1][0] <= ATE_BAR_MM and mean <= 2 * error
     print(
         f"calibrated less EuRoC's: {mean:+.2f} mm on average (standard error {error:.2f}), "
-        f"{worse[0]:+.2f} mm from the first frame; bars: {ATE_BAR_MM} mm from the first frame, on average not "
-        f"worse by two standard errors: {'ok' if ok else 'FAILED'}"
+        f"{worse[0]:+.2f} mm from the first frame; bars: {ATE_BAR_MM} mm from the first frame, "
+        f"on average not worse by two standard errors: {'ok' if ok else 'FAILED'}"
     )
     return 0 if ok else 1
 
