@@ -302,6 +302,9 @@ void keep_common(CameraImuRecording& recording, CameraImuFit& fit) {
       kept.poses.push_back(camera.poses[i]);
     }
     camera = std::move(kept);
+    if (camera.frames.empty()) {
+      throw DataError(fit.cameras[c].camera.name + ": no picture with the target has IMU samples at its time");
+    }
   }
 }
 
@@ -437,6 +440,7 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
   CameraImuFit fit;
   const double begin_cpu = cpu_s();
   CameraImuRecording recording = calib::read_recording(target, cameras, imu, options.corner_sigma_px, fit);
+  for (std::size_t c = 0; c < cameras.size(); ++c) fit.cameras[c].camera = cameras[c].camera;
   find_starts(target, options, recording, cameras, fit);
   keep_common(recording, fit);
   const double begin = recording.imu.front().t_s;
@@ -444,6 +448,8 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
   const double dt = (end - begin) / static_cast<double>(recording.imu.size() - 1);
   const calib::KnotChoice knots = calib::choose_knots(recording.imu, options.order, options.knot_spacing_s,
                                                       camera_period(recording.cameras.front().frames));
+  require(knots.spacing_s >= dt, "knot_spacing_s", knots.spacing_s,
+          "must not be less than from one IMU sample to the next (" + to_text(dt, 3) + " s)");
   const calib::ChainPlan plan = calib::plan_chain(begin, end, knots.spacing_s, options.order, options.bias_spacing_s);
   fit.knot_spacing_s = plan.grid.spacing_s;
   fit.knot_reason = knots.reason;

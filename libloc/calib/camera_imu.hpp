@@ -76,7 +76,7 @@ struct CameraImuOptions {
   int order = 6;  ///< of the pose's spline, 4 or 6 are usual
   RotationForm rotation = RotationForm::kCumulative;
   double knot_spacing_s = 0;     ///< 0: from the IMU's spectrum
-  double bias_spacing_s = 1;     ///< biases run straight between knots so far apart
+  double bias_spacing_s = 1;     ///< biases run straight between knots so far apart, at most a hundred of the pose's
   double corner_sigma_px = 0.3;  ///< of a coordinate
   double loss_sigmas = 3;        ///< Cauchy's: a corner so far off counts half
   double gravity = 9.80665;      ///< [m/s^2]

@@ -20,6 +20,7 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr int kLeastSegments = 20;  // of a window: fewer are no cheaper
+constexpr int kMostSegments = 100;  // more cost memory with their square
 // Deviation of the second differences of control points [rad, m]: a thousand times what a hand does. It decides where
 // nothing was measured, and keeps the equations solvable there.
 constexpr double kBendSigma = 10;
@@ -32,7 +33,8 @@ ChainPlan plan_chain(double begin_s, double end_s, double spacing_s, int order, 
   require_positive("length", length);
   ChainPlan plan;
   const int least = std::max(kLeastSegments, order);
-  int per_bias = std::max(1, static_cast<int>(std::lround(bias_spacing_s / spacing_s)));
+  const int per_bias =
+      static_cast<int>(std::clamp(std::round(bias_spacing_s / spacing_s), 1.0, static_cast<double>(kMostSegments)));
   if (per_bias >= least) {
     plan.segments_per_window = per_bias;
   } else {

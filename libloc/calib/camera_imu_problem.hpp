@@ -50,7 +50,8 @@ struct ChainPlan {
   double bias_spacing_s() const { return grid.spacing_s * segments_per_window / biases_per_window; }
   int bias_knots() const { return windows * biases_per_window + 1; }
 };
-/// A grid whose end is the end of its last window: the spacing is what comes next to the one that was asked for.
+/// A grid whose end is the end of its last window: the spacing is what comes next to the one that was asked for. Biases
+/// get knots at least every hundred segments.
 ChainPlan plan_chain(double begin_s, double end_s, double spacing_s, int order, double bias_spacing_s);
 
 struct CameraState {

@@ -597,6 +597,12 @@ TEST(CameraImu, WhatCannotBeSaysWhy) {
   const WavedRig rig = wave({.seconds = 3}, 1);
   EXPECT_THROW(calibrate(rig, {.order = 2}), std::invalid_argument);
   EXPECT_THROW(calibrate(rig, {.loss_sigmas = 0}), std::invalid_argument);
+  // Knots closer than samples are refused before any memory is asked for.
+  EXPECT_THROW(calibrate(wave({.seconds = 12}, 1), {.knot_spacing_s = 0.004}), std::invalid_argument);
+  // Biases that are all but constant: knots all the same, at every hundredth of the pose's.
+  const CameraImuFit even = calibrate(wave({.seconds = 12}, 1), {.bias_spacing_s = 1000});
+  EXPECT_TRUE(even.converged);
+  EXPECT_GT(even.bias_time_ns.size(), 4U);
 }
 
 }  // namespace
