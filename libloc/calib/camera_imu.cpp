@@ -445,7 +445,7 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
   keep_common(recording, fit);
   const double begin = recording.imu.front().t_s;
   const double end = recording.imu.back().t_s;
-  const double dt = (end - begin) / static_cast<double>(recording.imu.size() - 1);
+  const double dt = calib::sample_period(recording.imu);
   const calib::KnotChoice knots = calib::choose_knots(recording.imu, options.order, options.knot_spacing_s,
                                                       camera_period(recording.cameras.front().frames));
   require(knots.spacing_s >= dt, "knot_spacing_s", knots.spacing_s,

@@ -84,7 +84,7 @@ bool in_step(double a, double b) {
 
 double bandwidth_of(std::span<const ImuRow> imu) {
   if (imu.size() < 2) return 0;
-  const double dt = (imu.back().t_s - imu.front().t_s) / static_cast<double>(imu.size() - 1);
+  const double dt = sample_period(imu);
   auto piece = static_cast<std::size_t>(std::lround(kPiece / dt));
   piece += piece % 2;
   if (piece < 16 || imu.size() < 2 * piece) return 0;
@@ -99,7 +99,7 @@ double bandwidth_of(std::span<const ImuRow> imu) {
 
 KnotChoice choose_knots(std::span<const ImuRow> imu, int order, double given_s, double camera_period_s) {
   KnotChoice out;
-  const double dt = (imu.back().t_s - imu.front().t_s) / static_cast<double>(imu.size() - 1);
+  const double dt = sample_period(imu);
   out.bandwidth_hz = bandwidth_of(imu);
   const auto ms = [](double s) { return to_text(1e3 * s, 3) + " ms"; };
   const double wanted = out.bandwidth_hz > 0 ? 1 / (knots_per_period(order) * out.bandwidth_hz) : kUsualSamples * dt;

@@ -217,6 +217,12 @@ double turning_of(std::span<const ImuRow> imu) {
 
 }  // namespace
 
+double sample_period(std::span<const ImuRow> imu) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < imu.size(); ++i) steps.push_back(imu[i].t_s - imu[i - 1].t_s);
+  return quantile(steps, 0.5);
+}
+
 MeanRate::MeanRate(std::span<const ImuRow> imu) {
   Vector3d sum = Vector3d::Zero();
   for (std::size_t i = 0; i < imu.size(); ++i) {

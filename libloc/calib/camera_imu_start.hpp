@@ -21,6 +21,9 @@ struct ImuRow {
   Eigen::Vector3d accel;
 };
 
+/// Usual time from one sample to the next: gaps do not make it longer. Two samples are needed.
+double sample_period(std::span<const ImuRow> imu);
+
 /// Integral of the gyroscope over time, component by component: mean rates over any interval in constant time.
 class MeanRate {
  public:

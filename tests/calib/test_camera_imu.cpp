@@ -552,6 +552,14 @@ TEST(CameraImu, SamplesAndPicturesThatCannotBeUsedAreCounted) {
   EXPECT_EQ(fit.cameras[0].views[90].reason, "it has no time");
   EXPECT_TRUE(fit.cameras[0].views[40].used);
   EXPECT_LT(in_sigmas(error_of(fit, rig, 0) - error_of(clean, rig, 0), clean.cameras[0]).norm(), 1);
+  // Half of the IMU is lost in the middle: neither knots nor noise take the gap for the rate.
+  WavedRig gap = wave({.seconds = 20}, 2);
+  gap.imu.erase(gap.imu.begin() + 1500, gap.imu.begin() + 2500);
+  const CameraImuFit half = calibrate(gap);
+  EXPECT_TRUE(half.converged);
+  EXPECT_NEAR(half.knot_spacing_s, 0.02, 0.001);
+  EXPECT_NEAR(half.gyroscope_noise_scale, 1, 0.15);
+  EXPECT_LT(in_sigmas(error_of(half, gap, 0), half.cameras[0]).cwiseAbs().maxCoeff(), 4);
   // Readings in degrees: the camera knows better.
   for (ImuMeasurement& m : rig.imu) m.angular_velocity *= 180 / std::numbers::pi;
   expect_data_error([&] { calibrate(rig); }, {"times as fast as the camera", "deg/s"});
