@@ -46,7 +46,12 @@ _ROTATIONS = {
     "cumulative": libloc.RotationForm.CUMULATIVE,
     "three-angles": libloc.RotationForm.THREE_ANGLES,
 }
-_LEAST_PICTURES_SHOWN = 8
+_SEVERITIES = {
+    Verdict.OK: "note",
+    Verdict.FAIR: "hint",
+    Verdict.WARN: "warning",
+    Verdict.REFUSED: "error",
+}
 
 
 def _positive(text: str) -> float:
@@ -142,6 +147,8 @@ def check_options(parser: argparse.ArgumentParser, options: argparse.Namespace) 
         parser.error(f"--{error}")
     if min(options.camera) < 0 or len(set(options.camera)) < len(options.camera):
         parser.error(f"--camera {' '.join(map(str, options.camera))}: each camera once, counted from 0")
+    if options.camchain is not None and options.camchain.is_dir():
+        parser.error(f"--camchain {options.camchain}: is a folder, not a file")
     try:
         options.solver = _solver_options(options)
     except ValueError as error:
@@ -174,13 +181,16 @@ class _SolverProgress:
         self._shown = False
 
     def __call__(self, at: libloc.CameraImuProgress) -> bool:
-        if self._terminal:
-            self._shown = True
-            sys.stderr.write(
-                f"\rsolving: step {at.iteration}, cost {at.cost:.6g}, offset "
-                f"{1e3 * at.time_offset_s:.4f} ms, {at.elapsed_s:.1f} s (Ctrl-C: the best so far) "
-            )
-            sys.stderr.flush()
+        try:
+            if self._terminal:
+                self._shown = True
+                sys.stderr.write(
+                    f"\rsolving: step {at.iteration}, cost {at.cost:.6g}, offset "
+                    f"{1e3 * at.time_offset_s:.4f} ms, {at.elapsed_s:.1f} s (Ctrl-C: the best so far) "
+                )
+                sys.stderr.flush()
+        except KeyboardInterrupt:  # within this line instead of within the solver
+            return False
         return True
 
     def end(self) -> None:
@@ -188,21 +198,33 @@ class _SolverProgress:
             sys.stderr.write("\n")
 
 
-def _lint(data: CameraImuInput, options: argparse.Namespace) -> list[str]:
+def _lint(data: CameraImuInput, options: argparse.Namespace) -> list[libloc.CameraImuFinding]:
     """What is to be known of the recording. Raises DataError for what cannot be calibrated."""
+    rates, forces = data.as_read or (data.angular_velocity, data.specific_force)
     findings = libloc.lint_camera_imu(
-        options.target,
-        data.recordings(),
-        data.times_ns,
-        data.angular_velocity,
-        data.specific_force,
-        data.noise,
-        data.rate_hz,
+        options.target, data.recordings(), data.times_ns, rates, forces, data.noise, data.rate_hz
     )
-    refused = [f.text for f in findings if f.severity == Verdict.REFUSED]
-    if refused and not options.force:
-        raise DataError(f"{data.name}: " + " ".join(refused) + " (--force tries all the same)")
-    return [f"{f.text}" for f in findings]
+    if not options.force and any(f.severity == Verdict.REFUSED for f in findings):
+        _print(findings)
+        raise DataError(
+            f"{data.name}: cannot be calibrated as it is, see the errors above (--force tries all the same)"
+        )
+    return findings
+
+
+def _print(findings: list[libloc.CameraImuFinding]) -> None:
+    """Where there will be no result that names them."""
+    for finding in findings:
+        print(f"{_SEVERITIES[finding.severity]}: {finding.text}", file=sys.stderr)
+
+
+def _judged(fit: libloc.CameraImuFit, findings: list[libloc.CameraImuFinding]) -> tuple[Verdict, list[str]]:
+    """The solution cannot be better than the recording that it is from."""
+    doubts = [f for f in findings if f.severity in (Verdict.WARN, Verdict.REFUSED)]
+    verdict = Verdict(fit.quality.verdict)
+    if doubts and verdict != Verdict.REFUSED:
+        verdict = Verdict.WARN
+    return verdict, [*fit.quality.reasons, *(f.text for f in doubts)]
 
 
 def _mounting_table(camera: libloc.CameraImuCamera) -> Table:
@@ -289,7 +311,7 @@ def _matrix_rows(name: str, matrix: np.ndarray, sigma: np.ndarray) -> list[list[
     ]
 
 
-def sentence_of(fit: libloc.CameraImuFit) -> str:
+def sentence_of(fit: libloc.CameraImuFit, verdict: Verdict) -> str:
     """The verdict for somebody who does this for the first time."""
     worst = max(fit.cameras, key=lambda c: float(np.linalg.norm(c.sigma[3:6])))
     turn = np.rad2deg(np.linalg.norm(worst.sigma[:3]))
@@ -298,7 +320,6 @@ def sentence_of(fit: libloc.CameraImuFit) -> str:
         f"where {worst.camera.name} sits is known to {shift:.2g} mm and {turn:.2g} deg, "
         f"and the offset of the clocks to {1e3 * worst.sigma[6]:.2g} ms"
     )
-    verdict = Verdict(fit.quality.verdict)
     if verdict == Verdict.OK:
         return f"Good: {known}."
     if verdict == Verdict.FAIR:
@@ -313,8 +334,8 @@ def _check_text(check: libloc.CameraImuCheck, scale: float, unit: str) -> str:
     return text if check.estimated else f"held; one step from there says {text}"
 
 
-def _facts(data: CameraImuInput, fit: libloc.CameraImuFit) -> list[tuple[str, str]]:
-    facts = [("in one sentence", sentence_of(fit))]
+def _facts(data: CameraImuInput, fit: libloc.CameraImuFit, verdict: Verdict) -> list[tuple[str, str]]:
+    facts = [("in one sentence", sentence_of(fit, verdict))]
     for camera in fit.cameras:
         name, T = camera.camera.name, camera.camera.T_body_camera
         q = " ".join(f"{x:.8f}" for x in T.rotation_wxyz)
@@ -368,7 +389,9 @@ def _facts(data: CameraImuInput, fit: libloc.CameraImuFit) -> list[tuple[str, st
     return facts
 
 
-def _apply(fit: libloc.CameraImuFit, refined: bool, rig: libloc.Rig) -> None:
+def _apply(
+    fit: libloc.CameraImuFit, verdict: Verdict, reasons: list[str], refined: bool, rig: libloc.Rig
+) -> None:
     cameras = list(rig.cameras)
     for found in fit.cameras:
         name = found.camera.name
@@ -379,7 +402,7 @@ def _apply(fit: libloc.CameraImuFit, refined: bool, rig: libloc.Rig) -> None:
         if refined:
             camera.intrinsics_px, camera.distortion = found.camera.intrinsics_px, found.camera.distortion
             quality = libloc.IntrinsicsQuality()
-            quality.verdict, quality.reasons = fit.quality.verdict, list(fit.quality.reasons)
+            quality.verdict, quality.reasons = verdict, reasons
             quality.method, quality.pictures = "camera-imu", sum(view.used for view in found.views)
             quality.intrinsics_sigma_px, quality.distortion_sigma = (
                 found.intrinsics_sigma[:4],
@@ -387,7 +410,7 @@ def _apply(fit: libloc.CameraImuFit, refined: bool, rig: libloc.Rig) -> None:
             )
             camera.intrinsics_quality = quality
         mounting = libloc.MountingQuality()
-        mounting.verdict, mounting.reasons = fit.quality.verdict, list(fit.quality.reasons)
+        mounting.verdict, mounting.reasons = verdict, reasons
         mounting.method, mounting.pictures = "camera-imu", sum(view.used for view in found.views)
         mounting.set_deviations(found.camera.T_body_camera, found.covariance)
         if found.line_delay_s.estimated:
@@ -408,8 +431,12 @@ def write_camchain(path: Path, fit: libloc.CameraImuFit) -> None:
 
 
 def outcome_of(
-    data: CameraImuInput, fit: libloc.CameraImuFit, options: argparse.Namespace, lint: list[str]
+    data: CameraImuInput,
+    fit: libloc.CameraImuFit,
+    options: argparse.Namespace,
+    findings: list[libloc.CameraImuFinding],
 ) -> Outcome:
+    verdict, reasons = _judged(fit, findings)
     names = [camera.camera.name for camera in fit.cameras]
     tables: list[Table] = []
     for camera in fit.cameras:
@@ -430,16 +457,16 @@ def outcome_of(
                 + _matrix_rows("accelerometer", fit.accelerometer_matrix, fit.accelerometer_matrix_sigma),
             )
         )
-    notes = [*lint, *data.notes]
+    notes = [f.text for f in findings if f.severity in (Verdict.OK, Verdict.FAIR)] + data.notes
     if fit.stopped:
         notes.append(f"the solution was stopped ({fit.stopped}): this is the best so far")
     return Outcome(
         block=", ".join(f"cameras.{name}" for name in names),
         summary=f"{', '.join(names)} on the IMU, from {options.target} in {data.name}",
-        verdict=Verdict(fit.quality.verdict),
-        reasons=list(fit.quality.reasons),
-        apply=partial(_apply, fit, options.refine_intrinsics),
-        facts=_facts(data, fit),
+        verdict=verdict,
+        reasons=reasons,
+        apply=partial(_apply, fit, verdict, reasons, options.refine_intrinsics),
+        facts=_facts(data, fit, verdict),
         tables=tables,
         pictures=plots.pictures(
             fit, data.recordings(), (data.times_ns, data.angular_velocity, data.specific_force)
@@ -449,9 +476,34 @@ def outcome_of(
     )
 
 
+def _check_out(data: CameraImuInput, options: argparse.Namespace) -> None:
+    """The mounting holds for the intrinsics that it was found with: the rig that gets it must have the same.
+
+    Raises DataError.
+    """
+    if options.out is None or not options.out.exists():
+        return
+    of_name = {camera.name: camera for camera in libloc.read_rig(options.out).cameras}
+    for used in (c.camera for c in data.cameras):
+        there = of_name.get(used.name)
+        if there is None:
+            continue
+        same = there.distortion_model == used.distortion_model and (there.width_px, there.height_px) == (
+            used.width_px,
+            used.height_px,
+        )
+        values = [np.array([*c.intrinsics_px, *c.distortion]) for c in (there, used)]
+        if not same or not np.allclose(*values, rtol=1e-9, atol=1e-12):
+            raise DataError(
+                f"{options.out}: {used.name} has other intrinsics there than those of this calibration, "
+                "which the mounting would not fit: give this file with --rig, or name another with --out"
+            )
+
+
 def solve(data: CameraImuInput, options: argparse.Namespace) -> Outcome:
     """Raises DataError for what cannot be calibrated, with the reason."""
-    lint = _lint(data, options)
+    _check_out(data, options)
+    findings = _lint(data, options)
     progress = _SolverProgress()
     try:
         fit = libloc.calibrate_camera_imu(
@@ -464,11 +516,19 @@ def solve(data: CameraImuInput, options: argparse.Namespace) -> Outcome:
             options.solver,
             progress,
         )
+    except DataError:
+        _print(findings)  # the cause may be among them
+        raise
     finally:
         progress.end()
-    if options.camchain is not None and (options.force or fit.quality.verdict != Verdict.REFUSED):
-        write_camchain(options.camchain, fit)
-    return outcome_of(data, fit, options, lint)
+    outcome = outcome_of(data, fit, options, findings)
+    if options.camchain is not None:
+        if options.force or outcome.verdict != Verdict.REFUSED:
+            write_camchain(options.camchain, fit)
+            outcome.notes.append(f"Kalibr's camchain was written to {options.camchain}")
+        else:
+            outcome.notes.append(f"{options.camchain} was not written, because the result is refused")
+    return outcome
 
 
 def _collect(options: argparse.Namespace) -> CameraImuInput:

@@ -6,6 +6,7 @@ tables that another detector wrote; the IMU from the same recording or from a fi
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from dataclasses import dataclass, field
@@ -17,10 +18,10 @@ from numpy.typing import NDArray
 
 import libloc
 from libloc import DataError
-from libloc.images import PICTURES, number_of_pictures, picture_format, pictures
+from libloc.images import PICTURES, number_of_pictures, picture_format
 from libloc.programs import calibrate_input
 from libloc.programs.calibrate_images import Progress, other_target, read_corner_table
-from libloc.programs.calibrate_input import InputOptions
+from libloc.programs.calibrate_input import COUNTS, SI, InputOptions, same_times
 
 
 @dataclass
@@ -31,6 +32,7 @@ class CameraInput:
     views: list[libloc.TargetView] = field(default_factory=list)
     left_out: int = 0  # corners that were not sharp enough
     reasons: dict[str, int] = field(default_factory=dict)  # why there were no corners
+    damaged: list[str] = field(default_factory=list)  # a sentence for each picture that could not be read
 
 
 @dataclass
@@ -46,6 +48,8 @@ class CameraImuInput:
     notes: list[str] = field(default_factory=list)
     detect_cpu_s: float = 0.0
     interrupted: bool = False
+    # Rates and forces as read, where the rig has corrected them: a sensor's limit shows in these only.
+    as_read: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
     def recordings(self) -> list[libloc.CameraRecording]:
         return [libloc.CameraRecording(c.camera, c.views) for c in self.cameras]
@@ -65,7 +69,8 @@ class Sources:
 
 def _is_corner_table(path: Path) -> bool:
     with path.open(encoding="utf-8-sig", errors="replace") as file:
-        return "u_px" in file.readline()
+        names = {name.strip() for name in file.readline(4096).split(",")}
+    return bool(names & {"u_px", "v_px", "corner_id", "corner_index"})
 
 
 def _kalibr_folder(folder: Path, cameras: list[int]) -> Sources | None:
@@ -146,37 +151,45 @@ def read_rig(paths: list[Path], folder: Path | None, cameras: list[int]) -> libl
     """The rig of all files that were named, or of an EuRoC folder itself. Raises DataError."""
     rig = libloc.Rig()
     if not paths and folder is not None:
-        names = [f"cam{camera}" for camera in cameras]
-        paths = [found for name in [*names, "imu0"] if (found := _of_folder(folder, name)) is not None]
-        found_cameras = [libloc.read_any_rig(p) for p in paths]
-        rig.cameras = [camera for part in found_cameras for camera in part.cameras]
-        for part in found_cameras:
-            rig.imu = part.imu or rig.imu
-        return rig
+        names = [*(f"cam{camera}" for camera in cameras), "imu0"]
+        paths = [found for name in names if (found := _of_folder(folder, name)) is not None]
+    found_cameras: list[libloc.CameraCalibration] = []
     for path in paths:
         part = libloc.read_any_rig(path)
-        if part.cameras:
-            if rig.cameras:
-                raise DataError(f"{path}: the cameras are in another file already")
-            rig.cameras = part.cameras
+        there = {camera.name for camera in found_cameras}
+        twice = [camera.name for camera in part.cameras if camera.name in there]
+        if twice:
+            raise DataError(f"{path}: {twice[0]} is in another file already")
+        found_cameras += part.cameras
         if part.imu is not None:
             if rig.imu is not None:
                 raise DataError(f"{path}: the IMU is in another file already")
             rig.imu = part.imu
+    rig.cameras = found_cameras
     return rig
 
 
-def cameras_of(rig: libloc.Rig, numbers: list[int], from_folder: bool) -> list[libloc.CameraCalibration]:
-    """Those of the rig, by their place in it. Raises DataError when there is none."""
-    out = []
-    for at, number in enumerate(numbers):
-        place = at if from_folder else number
-        if place >= len(rig.cameras):
+def cameras_of(rig: libloc.Rig, numbers: list[int]) -> list[libloc.CameraCalibration]:
+    """Those of the rig that are called cam0, cam1, ... as their numbers; others by their place in it.
+
+    Raises DataError when there is none.
+    """
+    usual = re.compile(r"cam[0-9]+")
+    cameras = list(rig.cameras)
+    names = [camera.name for camera in cameras]
+    out: list[libloc.CameraCalibration] = []
+    for number in numbers:
+        at = names.index(f"cam{number}") if f"cam{number}" in names else number
+        # cam1 at the first place is not camera 0.
+        if at >= len(cameras) or (usual.fullmatch(names[at]) and names[at] != f"cam{number}"):
+            there = f" ({', '.join(names)})" if names else ""
             raise DataError(
-                f"the rig has {len(rig.cameras)} cameras, none with number {number}: name a file with its "
+                f"the rig has {len(cameras)} cameras{there}, none with number {number}: name a file with its "
                 "intrinsics (--rig; loc-calibrate camera finds them)"
             )
-        out.append(rig.cameras[place])
+        if any(camera.name == names[at] for camera in out):
+            raise DataError(f"--camera {' '.join(map(str, numbers))}: {names[at]} would be two of them")
+        out.append(cameras[at])
     return out
 
 
@@ -204,9 +217,16 @@ def find_views(
     interrupted = False
     done = hits = 0
     try:
-        for time_ns, picture in pictures(opened, number):
+        for measurement in opened:
+            if not isinstance(measurement, libloc.ImageMeasurement) or measurement.camera != number:
+                continue
             done += 1
             if (done - 1) % step:
+                continue
+            try:
+                picture = libloc.image_array(libloc.decode_image(measurement))
+            except DataError as error:
+                out.damaged.append(f"{camera.name}, picture of {measurement.time_ns}: {error}")
                 continue
             height, width = picture.shape
             if (width, height) != (camera.width_px, camera.height_px):
@@ -216,11 +236,11 @@ def find_views(
                 )
             seen = detector.detect(picture)
             out.left_out += seen.corners_left_out
-            out.views.append(libloc.TargetView(seen.view.ids, seen.view.pixels_px, time_ns))
             if len(seen.view):
                 hits += 1
             else:
                 out.reasons[seen.reason] = out.reasons.get(seen.reason, 0) + 1
+            out.views.append(libloc.TargetView(seen.view.ids, seen.view.pixels_px, measurement.time_ns))
             if len(first) < 4:
                 first.append(picture)
             progress.show(done, hits)
@@ -229,12 +249,15 @@ def find_views(
     progress.end()
     counts[f"{camera.name}.pictures.searched"] = len(out.views)
     counts[f"{camera.name}.pictures.with_target"] = hits
+    if out.damaged:
+        counts[f"{camera.name}.pictures.skipped.damaged"] = len(out.damaged)
     for name, count in opened.counts().items():
-        if "skip" in name or "damaged" in name:
+        if count and ("skip" in name or "missing" in name):
             counts[f"{camera.name}.{name}"] = count
     if hits == 0:
         if not out.views:
-            raise DataError(f"{path}: there are no pictures of camera {number} in it")
+            why = f" that can be read: {out.damaged[0]}" if out.damaged else " in it"
+            raise DataError(f"{path}: there are no pictures of camera {number}{why}")
         hint = other_target(target, first)
         raise DataError(
             f"{path}: the target ({target}) is in none of {len(out.views)} pictures: "
@@ -302,16 +325,23 @@ def read_input(
     """Reads and searches everything. Raises DataError naming file, line, field and value."""
     sources = sources_of(inputs, cameras, imu, name_unit)
     rig = read_rig(rigs, sources.folder, cameras)
-    calibrations = cameras_of(rig, cameras, from_folder=not rigs)
+    calibrations = cameras_of(rig, cameras)
     notes: list[str] = []
     counts: dict[str, int] = {}
     assert sources.imu is not None
     readings = _read_imu(sources.imu, text, notes)
     gyro, times = readings.need_times("gyroscope")
     accel = readings.need("accelerometer")
-    if len(gyro) != len(accel):
+    for kind, triad in (("gyroscope", gyro), ("accelerometer", accel)):
+        if triad.unit == COUNTS:
+            raise DataError(
+                f"{sources.imu}: the {kind} is in the sensor's own counts: it must be calibrated "
+                f"(loc-calibrate {kind}) and written in {SI[kind]}"
+            )
+    if not same_times(gyro, accel):
         raise DataError(
-            f"{sources.imu}: {len(gyro)} readings of the gyroscope and {len(accel)} of the accelerometer"
+            f"{sources.imu}: {len(gyro)} readings of the gyroscope and {len(accel)} of the accelerometer, "
+            "not at the same times: both are needed in each line"
         )
     begin = time.process_time()
     found: list[CameraInput] = []
@@ -320,7 +350,7 @@ def read_input(
         for path, camera in zip(sources.tables, calibrations, strict=True):
             table = read_corner_table(path, target, camera.width_px, camera.height_px)
             found.append(CameraInput(camera, table.views))
-            counts[f"{camera.name}.pictures.with_target"] = len(table.views)
+            counts |= {f"{camera.name}.{name}": n for name, n in table.counts.items()}
     else:
         for source, camera in zip(sources.pictures, calibrations, strict=True):
             views, stopped = find_views(target, source, camera, step, counts, stream)
@@ -329,11 +359,18 @@ def read_input(
     if interrupted:
         notes.append("interrupted: the rest of the pictures was not searched")
     for camera_input in found:
+        notes += camera_input.damaged[:3]
+        if len(camera_input.damaged) > 3:
+            notes.append(f"{len(camera_input.damaged) - 3} more pictures could not be read")
         if camera_input.left_out:
             notes.append(
                 f"{camera_input.left_out} corners of {camera_input.camera.name} were not sharp enough"
             )
-    counts |= {name: n for name, n in readings.counts.items() if name.startswith("imu.")}
+    # Of a log, what concerns other streams is left away.
+    own = ("imu.", "rows.", "gyroscope.", "accelerometer.")
+    counts |= {
+        name: n for name, n in readings.counts.items() if n and (name.startswith(own) or "skip" in name)
+    }
     rates, forces = corrected(rig, gyro.rows, accel.rows)
     return CameraImuInput(
         name=", ".join(path.name for path in inputs),
@@ -341,6 +378,7 @@ def read_input(
         times_ns=times,
         angular_velocity=rates,
         specific_force=forces,
+        as_read=(np.ascontiguousarray(gyro.rows), np.ascontiguousarray(accel.rows)),
         noise=noise_of(rig, notes),
         rate_hz=rig.imu.rate_hz if rig.imu is not None else 0.0,
         counts=counts,

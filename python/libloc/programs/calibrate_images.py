@@ -269,22 +269,20 @@ def other_target(target: libloc.CalibrationTarget, some: list[Grey]) -> str:
     return ""
 
 
-def _time_of(path: Path, text: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise DataError(f"{path}: timestamp_ns '{text}' is no number of nanoseconds") from None
-
-
 def read_corner_table(path: Path, target: libloc.CalibrationTarget, width_px: int, height_px: int) -> Corners:
     """Corners of any detector (CSV: timestamp_ns, tag_id and corner_index or corner_id, u_px, v_px).
 
-    Raises DataError naming file, line and value.
+    The pictures come in the order in which the table names them first. A last line that was cut while it was
+    written is left out and counted. Raises DataError naming file, line and value.
     """
     out = Corners(width_px=width_px, height_px=height_px)
-    pictures_of: dict[str, list[tuple[int, float, float]]] = {}
+    pictures_of: dict[int, dict[int, tuple[float, float]]] = {}
     corner_count = len(target.corners())
-    with path.open(encoding="utf-8-sig", newline="") as file:
+    with path.open("rb") as binary:
+        binary.seek(0, io.SEEK_END)
+        binary.seek(max(0, binary.tell() - 1))
+        cut = binary.read(1) not in (b"\n", b"\r")
+    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
         reader = csv.reader(file)
         names = [name.strip() for name in next(reader, [])]
         by_tag = {"tag_id", "corner_index"} <= set(names)
@@ -297,26 +295,47 @@ def read_corner_table(path: Path, target: libloc.CalibrationTarget, width_px: in
         tag, index = (
             names.index(name) for name in (("tag_id", "corner_index") if by_tag else ("corner_id",) * 2)
         )
-        for row in reader:
-            if not row:
-                continue
+        rows = ((reader.line_num, row) for row in reader if row)
+        line, row = next(rows, (0, []))
+        while row:
+            at, cells = line, row
+            line, row = next(rows, (0, []))
+            if not row and cut:
+                out.counts["rows.skipped.no_line_end"] = 1  # its last number may have lost digits
+                break
+            where = f"{path}:{at}"
+            if len(cells) != len(names):
+                raise DataError(f"{where}: {len(cells)} cells, not {len(names)}")
             try:
-                number = (
-                    4 * (int(row[tag]) - target.first_tag) + int(row[index]) if by_tag else int(row[index])
-                )
-                corner = (number, float(row[u]), float(row[v]))
-            except (IndexError, ValueError) as error:
-                raise DataError(f"{path}:{reader.line_num}: {error}") from None
-            if not (0 <= number < corner_count and math.isfinite(corner[1]) and math.isfinite(corner[2])):
+                stamp = int(cells[time])
+            except ValueError:
                 raise DataError(
-                    f"{path}:{reader.line_num}: corner {number} at {corner[1:]} is none of {target}"
-                )
-            pictures_of.setdefault(row[time], []).append(corner)
-    for name, corners in pictures_of.items():
-        corners.sort()
-        out.names.append(name)
-        ids = np.array([c[0] for c in corners], dtype=np.int64)
-        out.views.append(libloc.TargetView(ids, np.array([c[1:] for c in corners]), _time_of(path, name)))
+                    f"{where}: timestamp_ns '{cells[time]}' is no number of nanoseconds"
+                ) from None
+            if not -(2**63) < stamp < 2**63:
+                raise DataError(f"{where}: timestamp_ns {stamp} is out of range")
+            try:
+                if by_tag:
+                    corner = int(cells[index])
+                    number = 4 * (int(cells[tag]) - target.first_tag) + corner
+                    known = 0 <= corner < 4
+                else:
+                    number, known = int(cells[index]), True
+                pixel = (float(cells[u]), float(cells[v]))
+            except ValueError as error:
+                raise DataError(f"{where}: {error}") from None
+            known = known and 0 <= number < corner_count
+            if not (known and math.isfinite(pixel[0]) and math.isfinite(pixel[1])):
+                what = f"{corner} of tag {cells[tag]}" if by_tag else f"{number}"
+                raise DataError(f"{where}: corner {what} at {pixel} is none of {target}")
+            picture = pictures_of.setdefault(stamp, {})
+            if number in picture:
+                raise DataError(f"{where}: corner {number} comes twice in the picture of {stamp}")
+            picture[number] = pixel
+    for stamp, corners in pictures_of.items():
+        out.names.append(str(stamp))
+        ids = np.array(sorted(corners), dtype=np.int64)
+        out.views.append(libloc.TargetView(ids, np.array([corners[i] for i in ids.tolist()]), stamp))
     out.counts["pictures.with_target"] = len(out.names)
     if not out.names:
         raise DataError(f"{path}: there are no corners in it")
