@@ -187,8 +187,6 @@ def cameras_of(rig: libloc.Rig, numbers: list[int]) -> list[libloc.CameraCalibra
                 f"the rig has {len(cameras)} cameras{there}, none with number {number}: name a file with its "
                 "intrinsics (--rig; loc-calibrate camera finds them)"
             )
-        if any(camera.name == names[at] for camera in out):
-            raise DataError(f"--camera {' '.join(map(str, numbers))}: {names[at]} would be two of them")
         out.append(cameras[at])
     return out
 
@@ -378,7 +376,9 @@ def read_input(
         times_ns=times,
         angular_velocity=rates,
         specific_force=forces,
-        as_read=(np.ascontiguousarray(gyro.rows), np.ascontiguousarray(accel.rows)),
+        as_read=None
+        if rig.imu is None
+        else (np.ascontiguousarray(gyro.rows), np.ascontiguousarray(accel.rows)),
         noise=noise_of(rig, notes),
         rate_hz=rig.imu.rate_hz if rig.imu is not None else 0.0,
         counts=counts,

@@ -1,0 +1,301 @@
+"""What loc-calibrate camera-imu makes of files that are not as they should be."""
+
+from pathlib import Path
+
+import loc
+import numpy as np
+import pytest
+from libloc.lcm_log import LogWriter
+from libloc.programs import calibrate, calibrate_camera_imu
+from libloc.programs import calibrate_camera_imu_input as reading
+from libloc.programs.calibrate_images import read_corner_table
+from libloc.programs.calibrate_input import InputOptions
+from waved_rig import START_NS, Waved, a_camera
+
+import libloc
+
+BOARD = ("--target", "checkerboard", "9x6", "0.06")
+TAGS = libloc.CalibrationTarget("aprilgrid 6x6 0.088 0.3 100")
+HEADING = "timestamp_ns,tag_id,corner_index,u_px,v_px"
+needs_vision = pytest.mark.skipif(not libloc.HAS_VISION, reason="built without OpenCV")
+
+
+@pytest.fixture(scope="module")
+def waved() -> Waved:
+    return Waved()
+
+
+def write_corners(path: Path, waved: Waved) -> Path:
+    rows = [
+        f"{view.time_ns},{i},{u!r},{v!r}"
+        for view in waved.views()
+        for i, (u, v) in zip(view.ids, view.pixels_px.tolist(), strict=True)
+    ]
+    path.write_text("\n".join(["timestamp_ns,corner_id,u_px,v_px", *rows]) + "\n")
+    return path
+
+
+def imu_rows(waved: Waved) -> list[str]:
+    readings = np.hstack([waved.angular_velocity, waved.specific_force]).tolist()
+    return [f"{t}," + ",".join(map(repr, row)) for t, row in zip(waved.imu_times_ns, readings, strict=True)]
+
+
+IMU_HEADING = "time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
+
+
+@pytest.fixture
+def files(waved, tmp_path) -> tuple[Path, Path, Path]:
+    imu = tmp_path / "imu.csv"
+    imu.write_text("\n".join([IMU_HEADING, *imu_rows(waved)]) + "\n")
+    rig = tmp_path / "rig.yaml"
+    libloc.write_rig(rig, waved.rig())
+    return write_corners(tmp_path / "corners.csv", waved), imu, rig
+
+
+def run(capsys, *arguments, code=0) -> str:
+    assert calibrate.main(["camera-imu", *(str(a) for a in arguments)]) == code, capsys.readouterr()
+    out = capsys.readouterr()
+    assert "Traceback" not in out.err
+    return out.out + out.err
+
+
+def table(path: Path, *rows: str, end: str = "\n") -> Path:
+    path.write_text("\n".join([HEADING, *rows]) + end)
+    return path
+
+
+def test_corner_table_carries_times_in_the_order_of_the_file(tmp_path):
+    path = table(tmp_path / "c.csv", "20,100,1,3,4", "20,100,0,1,2", "10,101,3,5,6", " 20,135,2,7,8")
+    corners = read_corner_table(path, TAGS, 752, 480)
+    assert [view.time_ns for view in corners.views] == [20, 10]
+    assert [view.ids.tolist() for view in corners.views] == [[0, 1, 142], [7]]
+    assert corners.views[0].pixels_px.tolist() == [[1, 2], [3, 4], [7, 8]]
+    # Cut while it was written: 33.25 may have been on its way.
+    path = table(tmp_path / "c.csv", "20,100,1,3,4", "20,100,0,1,33.2", end="")
+    corners = read_corner_table(path, TAGS, 752, 480)
+    assert corners.views[0].ids.tolist() == [1]
+    assert corners.counts["rows.skipped.no_line_end"] == 1
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ("5,99,0,1,2", "c.csv:3: corner 0 of tag 99"),
+        ("5,100,4,1,2", "c.csv:3: corner 4 of tag 100"),  # not corner 0 of tag 101
+        ("5,101,-1,1,2", "c.csv:3: corner -1 of tag 101"),
+        ("5,100,0,inf,2", "c.csv:3: corner 0 of tag 100"),
+        ("5,100,0,1", "c.csv:3: 4 cells, not 5"),
+        ("5,100,0,1,2,3", "c.csv:3: 6 cells, not 5"),
+        ("5,100,0,x,2", "c.csv:3: .*'x'"),
+        ("5.5,100,0,1,2", "c.csv:3: timestamp_ns '5.5'"),
+        ("99999999999999999999,100,0,1,2", "c.csv:3: timestamp_ns .* out of range"),
+        ("1,100,0,1,2", "c.csv:3: corner 0 comes twice in the picture of 1"),
+    ],
+)
+def test_corner_table_names_the_line(tmp_path, row, message):
+    path = table(tmp_path / "c.csv", "1,100,0,1,2", row, "9,100,0,1,2")
+    with pytest.raises(libloc.DataError, match=message):
+        read_corner_table(path, TAGS, 752, 480)
+
+
+def test_cameras_are_found_by_their_names():
+    def named(*names: str) -> libloc.Rig:
+        rig = libloc.Rig()
+        rig.cameras = [a_camera(name) for name in names]
+        return rig
+
+    def found(rig: libloc.Rig, *numbers: int) -> list[str]:
+        return [camera.name for camera in reading.cameras_of(rig, list(numbers))]
+
+    assert found(named("cam1", "cam0"), 0, 1) == ["cam0", "cam1"]
+    assert found(named("left", "right"), 1) == ["right"]
+    assert found(named("cam1"), 1) == ["cam1"]
+    # Intrinsics of another camera are never taken.
+    with pytest.raises(libloc.DataError, match=r"1 cameras \(cam1\), none with number 0"):
+        found(named("cam1"), 0)
+    with pytest.raises(libloc.DataError, match="0 cameras, none with number 0"):
+        found(named(), 0)
+
+
+def test_rig_of_several_files(tmp_path):
+    paths = []
+    for i in range(2):
+        rig = libloc.Rig()
+        rig.cameras = [a_camera(f"cam{i}")]
+        if i:
+            rig.imu = libloc.ImuCalibration()
+        paths.append(tmp_path / f"{i}.yaml")
+        libloc.write_rig(paths[-1], rig)
+    rig = reading.read_rig(paths, None, [0, 1])
+    assert [camera.name for camera in rig.cameras] == ["cam0", "cam1"]
+    assert rig.imu is not None
+    with pytest.raises(libloc.DataError, match=r"0.yaml: cam0 is in another file already"):
+        reading.read_rig([*paths, paths[0]], None, [0, 1])
+    rig.cameras = []
+    libloc.write_rig(tmp_path / "imu.yaml", rig)
+    with pytest.raises(libloc.DataError, match=r"imu.yaml: the IMU is in another file already"):
+        reading.read_rig([*paths, tmp_path / "imu.yaml"], None, [0, 1])
+
+
+def test_readings_are_corrected_by_the_rig(files, waved, tmp_path, capsys):
+    corners, imu, path = files
+    twice = np.hstack([waved.angular_velocity * 2 + 0.3, waved.specific_force * 0.5 - 1]).tolist()
+    rows = [f"{t}," + ",".join(map(repr, row)) for t, row in zip(waved.imu_times_ns, twice, strict=True)]
+    imu.write_text("\n".join([IMU_HEADING, *rows]) + "\n")
+    rig = waved.rig()
+    calibration = libloc.ImuCalibration()
+    for name, scale, bias in (("gyroscope", 0.5, 0.3), ("accelerometer", 2.0, -1.0)):
+        triad = libloc.TriadCalibration()
+        triad.matrix, triad.bias = scale * np.eye(3), np.full(3, bias)
+        setattr(calibration, name, triad)
+    rig.imu = calibration
+    libloc.write_rig(path, rig)
+    data = reading.read_input(
+        [corners, imu], [0], [path], None, libloc.CalibrationTarget("checkerboard 9x6 0.06"), InputOptions()
+    )
+    np.testing.assert_allclose(data.angular_velocity, waved.angular_velocity, atol=1e-12)
+    np.testing.assert_allclose(data.specific_force, waved.specific_force, atol=1e-12)
+    np.testing.assert_allclose(data.as_read, (np.array(twice)[:, :3], np.array(twice)[:, 3:]))
+    text = run(capsys, corners, imu, *BOARD, "--rig", path, "--out", path)
+    assert "usual MEMS" not in text
+    (found,) = libloc.read_rig(path).cameras
+    assert np.abs(waved.off_by_sigmas(found)).max() < 4
+    np.testing.assert_array_equal(libloc.read_rig(path).imu.gyroscope.bias, np.full(3, 0.3))  # stays
+
+
+def test_imu_that_is_no_imu(files, waved, tmp_path, capsys):
+    corners, imu, rig = files
+    rows = imu_rows(waved)
+
+    def said(*lines: str, end: str = "\n", code: int = 1) -> str:
+        imu.write_text("\n".join(lines) + end)
+        return run(capsys, corners, imu, *BOARD, "--rig", rig, code=code)
+
+    halves = ["time_ns,wx_rad_s,wy_rad_s,wz_rad_s", *(",".join(row.split(",")[:4]) for row in rows)]
+    assert "no accelerometer in it" in said(*halves)
+    assert "imu.csv:3" in said(IMU_HEADING, rows[0], "soon,1,2,3,4,5,6", *rows[2:])
+    assert "no such file" in run(capsys, corners, tmp_path / "none.csv", *BOARD, "--rig", rig, code=1)
+    # What is skipped is counted, and the rest is used.
+    text = said(IMU_HEADING, *rows[:900], rows[850], "1,nan,0,0,0,0,9.8", *rows[900:], end="", code=0)
+    assert "no_line_end: 1" in text
+    assert "skipped" in text
+
+
+def test_findings_come_with_the_result(files, waved, tmp_path, capsys):
+    corners, imu, rig = files
+    # Half of all readings repeat the one before: to be used with care, whatever the solution says.
+    rows = imu_rows(waved)
+    held = [
+        row if i % 2 == 0 else f"{row.split(',')[0]}," + rows[i - 1].split(",", 1)[1]
+        for i, row in enumerate(rows)
+    ]
+    imu.write_text("\n".join([IMU_HEADING, *held]) + "\n")
+    out = tmp_path / "out.yaml"
+    text = run(capsys, corners, imu, *BOARD, "--rig", rig, "--out", out, "--force")
+    quality = libloc.read_rig(out).cameras[0].mounting_quality
+    assert quality.verdict in (libloc.Verdict.WARN, libloc.Verdict.REFUSED)
+    assert any(reason in text and "to the last bit" in reason for reason in quality.reasons), quality.reasons
+    assert "Good:" not in text
+    # Gravity taken away: refused, but tried when that is wanted.
+    flat = [f"{t},0.1,0.2,{i % 7},0,0,0" for i, t in enumerate(waved.imu_times_ns)]
+    imu.write_text("\n".join([IMU_HEADING, *flat]) + "\n")
+    text = run(capsys, corners, imu, *BOARD, "--rig", rig, code=1)
+    assert "error: " in text
+    assert "--force tries all the same" in text
+
+
+def test_the_written_rig_fits_the_intrinsics(files, waved, tmp_path, capsys):
+    corners, imu, rig = files
+    out = tmp_path / "out.yaml"
+    other = waved.rig()
+    camera = a_camera("cam0")
+    camera.intrinsics_px = [410, 411, 322, 197]
+    other.cameras = [camera]
+    libloc.write_rig(out, other)
+    before = out.read_bytes()
+    text = run(capsys, corners, imu, *BOARD, "--rig", rig, "--out", out, code=1)
+    assert "out.yaml: cam0 has other intrinsics there" in text
+    assert out.read_bytes() == before
+    # Other cameras of the file stay.
+    camera.name = "cam7"
+    other.cameras = [camera]
+    libloc.write_rig(out, other)
+    camchain = tmp_path / "chain.yaml"
+    text = run(capsys, corners, imu, *BOARD, "--rig", rig, "--out", out, "--camchain", camchain)
+    assert f"camchain was written to {camchain}" in text
+    cameras = libloc.read_rig(out).cameras
+    assert [c.name for c in cameras] == ["cam7", "cam0"]
+    assert cameras[0].mounting_quality is None
+    with pytest.raises(SystemExit) as usage:
+        run(capsys, corners, imu, *BOARD, "--rig", rig, "--camchain", tmp_path)
+    assert usage.value.code == 2
+    assert "is a folder" in capsys.readouterr().err
+
+
+def test_ctrl_c_within_the_progress_line_stops_the_solver(monkeypatch):
+    class Terminal:
+        def isatty(self) -> bool:
+            return True
+
+        def write(self, text: str) -> None:
+            if "solving" in text:
+                raise KeyboardInterrupt
+
+        def flush(self) -> None:
+            pass
+
+    monkeypatch.setattr(calibrate_camera_imu.sys, "stderr", Terminal())
+    waved = Waved(seconds=6)
+    fit = libloc.calibrate_camera_imu(
+        waved.target,
+        [libloc.CameraRecording(waved.cameras[0], waved.views())],
+        waved.imu_times_ns,
+        waved.angular_velocity,
+        waved.specific_force,
+        progress=calibrate_camera_imu._SolverProgress(),
+    )
+    assert fit.stopped == "interrupted"
+
+
+@needs_vision
+def test_damaged_pictures_and_ctrl_c_in_the_search(tmp_path, monkeypatch, capsys):
+    target = libloc.CalibrationTarget("checkerboard 9x6 0.06")
+    waved = Waved(seconds=3, camera_hz=4, cameras=[a_camera("cam0", 0.6)])
+    renderings = waved.renderings()
+    log = tmp_path / "run.lcm"
+    with LogWriter(log) as writer:
+        for i, (stamp, picture) in enumerate(zip(waved.picture_times()[1], renderings, strict=True)):
+            m = loc.image_t()
+            m.time_ns, m.camera, m.sequence = int(stamp), 0, i
+            m.height, m.width = picture.shape
+            m.row_stride, m.pixelformat, m.data = m.width, m.PIXEL_FORMAT_GRAY, picture.tobytes()
+            if i == 2:
+                m.row_stride, m.pixelformat, m.data = 0, m.PIXEL_FORMAT_MJPEG, b"\xff\xd8 no picture"
+            m.size = len(m.data)
+            writer.write("LOC_IMAGE", m, (int(stamp) - START_NS) // 1000)
+    counts: dict[str, int] = {}
+    source = (log, {"camera": 0})
+    found, interrupted = reading.find_views(target, source, waved.cameras[0], 1, counts)
+    assert not interrupted
+    assert counts["cam0.pictures.skipped.damaged"] == 1
+    assert len(found.views) == counts["cam0.pictures.searched"] == len(renderings) - 1
+    assert int(waved.picture_times()[1][2]) not in [view.time_ns for view in found.views]
+    assert "picture of" in found.damaged[0]
+
+    class Interrupting:
+        def __init__(self, *arguments) -> None:
+            self._detector = detector(*arguments)
+            self._left = 3
+
+        def detect(self, picture):
+            self._left -= 1
+            if self._left < 0:
+                raise KeyboardInterrupt
+            return self._detector.detect(picture)
+
+    detector = libloc.TargetDetector
+    monkeypatch.setattr(reading.libloc, "TargetDetector", Interrupting)
+    found, interrupted = reading.find_views(target, source, waved.cameras[0], 1, counts)
+    assert interrupted
+    assert len(found.views) == 3
+    capsys.readouterr()
