@@ -299,3 +299,57 @@ def test_damaged_pictures_and_ctrl_c_in_the_search(tmp_path, monkeypatch, capsys
     assert interrupted
     assert len(found.views) == 3
     capsys.readouterr()
+
+
+def test_what_is_what_in_input(tmp_path):
+    """By content, in any order."""
+
+    def file(name: str, text: str = "x") -> Path:
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        return path
+
+    def sorted_out(*inputs: Path, cameras: tuple[int, ...] = (0,), imu: Path | None = None):
+        out = reading.sources_of(list(inputs), list(cameras), imu, "us")
+        return out.pictures, out.tables, out.imu
+
+    imu = file("imu.csv", IMU_HEADING + "\n")
+    named = file("named/123.png").parent
+    assert sorted_out(imu, named) == ([(named, {"name_unit": "us"})], [], imu)
+    right = file("right/123.png").parent
+    both = [(right, {"name_unit": "us"}), (named, {"name_unit": "us"})]
+    assert sorted_out(right, imu, named, cameras=(0, 1)) == (both, [], imu)
+    index = file("listed/data.csv")
+    file("listed/1.png")
+    assert sorted_out(index.parent, imu) == ([(index.parent, {"times_file": index})], [], imu)
+    index = file("cam0/data.csv")
+    data = file("cam0/data/1.png").parent
+    expected = ([(data, {"times_file": index})], [], imu)
+    assert sorted_out(index.parent, imu) == sorted_out(data, imu) == expected
+    # A recording with an IMU of its own: a file that is named is taken before it.
+    euroc = file("run/mav0/cam0/data.csv").parents[2]
+    assert sorted_out(euroc) == ([(euroc, {"camera": 0})], [], euroc)
+    assert sorted_out(euroc, imu)[2] == sorted_out(imu, euroc)[2] == imu
+    assert sorted_out(euroc, imu=imu)[2] == imu
+    kalibr = file("kalibr/cam0/123.png").parents[1]
+    own = file("kalibr/imu0.csv")
+    assert sorted_out(kalibr) == ([(kalibr / "cam0", {"name_unit": "ns"})], [], own)
+    corners = file("corners.csv", HEADING + "\n")
+    assert sorted_out(corners, imu=euroc) == ([], [corners], euroc)
+    for inputs, message in (
+        ((named, right, imu), "2 folders or videos for 1 cameras"),
+        ((euroc, named), "run gives the pictures already"),
+        ((named, euroc), "run gives the pictures already"),
+        ((kalibr, euroc), "gives the pictures already"),
+        ((corners, named, imu), "corners, and .*named gives pictures"),
+        ((corners, corners, imu), "2 tables of corners for 1 cameras"),
+        ((named / "123.png", imu), "single pictures have no times"),
+        ((named,), "no IMU in INPUT"),
+        ((imu,), "neither pictures nor a table"),
+        ((named, imu, imu), "gives the IMU already"),
+    ):
+        with pytest.raises(libloc.DataError, match=message):
+            sorted_out(*inputs)
+    with pytest.raises(libloc.DataError, match="there is no cam1 in it"):
+        sorted_out(kalibr, cameras=(0, 1))

@@ -86,49 +86,64 @@ def _kalibr_folder(folder: Path, cameras: list[int]) -> Sources | None:
     return out
 
 
+def _times_of(folder: Path, name_unit: str) -> tuple[Path, dict[str, Any]]:
+    """The folder that holds the pictures, and what tells their times (data.csv, a list, their names)."""
+    if (folder / "data").is_dir() and (folder / "data.csv").is_file():
+        return folder / "data", {"times_file": folder / "data.csv"}
+    for index in (folder / "data.csv", folder.parent / "data.csv"):
+        if index.is_file() and (index.parent == folder or folder.name == "data"):
+            return folder, {"times_file": index}
+    if any((folder / name).is_file() for name in ("rgb.txt", "times.txt")):
+        return folder, {}
+    return folder, {"name_unit": name_unit}
+
+
 def sources_of(inputs: list[Path], cameras: list[int], imu: Path | None, name_unit: str) -> Sources:
     """Raises DataError naming what is missing or too much."""
-    out = Sources()
+    out = Sources(imu=imu)
+    singles: list[tuple[Path, dict[str, Any]]] = []  # folders and videos of one camera
+    beside: Path | None = None  # the IMU of a recording with pictures: only where no file gives it alone
     for path in inputs:
-        if path.is_file() and path.suffix.lower() == ".csv":
-            if _is_corner_table(path):
-                out.tables.append(path)
-            elif out.imu is not None:
-                raise DataError(
-                    f"{path}: {out.imu} gives the IMU already, and corners have columns u_px, v_px"
-                )
-            else:
-                out.imu = path
+        if path.is_file() and path.suffix.lower() in PICTURES:
+            raise DataError(f"{path}: single pictures have no times: give their folder")
+        if path.is_file() and path.suffix.lower() == ".csv" and _is_corner_table(path):
+            out.tables.append(path)
             continue
         form = picture_format(path)
         if form is None:
-            if path.suffix.lower() in PICTURES:
-                raise DataError(f"{path}: single pictures have no times: give their folder")
             if out.imu is not None:
-                raise DataError(f"{path}: {out.imu} gives the IMU already")
+                raise DataError(
+                    f"{path}: {out.imu} gives the IMU already, and corners have columns u_px, v_px"
+                )
             out.imu = path
             continue
         if out.pictures:
             raise DataError(f"{path}: {out.pictures[0][0]} gives the pictures already")
         kalibr = _kalibr_folder(path, cameras) if path.is_dir() else None
         if kalibr is not None:
-            out.pictures, out.folder = kalibr.pictures, path
-            out.imu = out.imu or kalibr.imu
-            continue
-        how: dict[str, Any] = {}
-        if form == "folder" and not (path / "data.csv").is_file():
-            how = {"name_unit": name_unit}
-        if form in ("euroc", "lcm"):
-            out.imu = out.imu or path
-        if form == "euroc":
-            out.folder = path
-        if form in ("folder", "video") and len(cameras) > 1:
-            raise DataError(f"{path}: holds the pictures of one camera, not of {len(cameras)}")
-        out.pictures = [(path, {**how, "camera": camera}) for camera in cameras]
-    if imu is not None:
-        out.imu = imu
+            out.pictures, out.folder, beside = kalibr.pictures, path, kalibr.imu
+        elif form == "folder":
+            singles.append(_times_of(path, name_unit))
+        elif form == "video":
+            singles.append((path, {}))
+        else:
+            out.folder = path if form == "euroc" else None
+            out.pictures = [(path, {"camera": camera}) for camera in cameras]
+            beside = path
+    if singles and out.pictures:
+        raise DataError(f"{singles[0][0]}: {out.pictures[0][0]} gives the pictures already")
+    if singles and len(singles) != len(cameras):
+        raise DataError(
+            f"{singles[0][0]}: {len(singles)} folders or videos for {len(cameras)} cameras: name the cameras "
+            "with --camera, in this order"
+        )
+    out.pictures = out.pictures or singles
+    out.imu = out.imu or beside
     if out.tables and out.pictures:
-        raise DataError(f"{out.tables[0]}: corners, and {out.pictures[0][0]} gives pictures: one of them")
+        raise DataError(
+            f"{out.tables[0]}: corners, and {out.pictures[0][0]} gives pictures: one of them (--imu takes "
+            "the IMU of a recording alone)"
+        )
     if not out.tables and not out.pictures:
         raise DataError("there are neither pictures nor a table of corners (CSV with u_px, v_px) in INPUT")
     if out.imu is None:
@@ -208,7 +223,8 @@ def find_views(
     path, how = source
     detector = libloc.TargetDetector(target)
     out = CameraInput(camera)
-    opened = libloc.open_pictures(path, **how)
+    listed = "times_file" in how
+    opened = libloc.open_image_folder(path, **how) if listed else libloc.open_pictures(path, **how)
     number = how.get("camera", 0)
     progress = Progress(number_of_pictures(path, number), stream or sys.stderr)
     first: list[NDArray[np.uint8]] = []
