@@ -1,6 +1,8 @@
 """What loc-calibrate camera-imu makes of files that are not as they should be."""
 
+import argparse
 from pathlib import Path
+from types import SimpleNamespace
 
 import loc
 import numpy as np
@@ -161,6 +163,23 @@ def test_readings_are_corrected_by_the_rig(files, waved, tmp_path, capsys):
     (found,) = libloc.read_rig(path).cameras
     assert np.abs(waved.off_by_sigmas(found)).max() < 4
     np.testing.assert_array_equal(libloc.read_rig(path).imu.gyroscope.bias, np.full(3, 0.3))  # stays
+
+
+def test_saturation_is_seen_in_the_readings_as_read(files, waved):
+    corners, imu, path = files
+    target = libloc.CalibrationTarget("checkerboard 9x6 0.06")
+    data = reading.read_input([corners, imu], [0], [path], None, target, InputOptions())
+    options = argparse.Namespace(target=target, force=False)
+    before = [finding.code for finding in calibrate_camera_imu._lint(data, options)]
+    # The sensor's axes are not those of the body, where its limit is no single number.
+    data.as_read = (np.clip(4 * waved.angular_velocity, -2, 2), waved.specific_force)
+    findings = calibrate_camera_imu._lint(data, options)
+    assert [finding.code for finding in findings] == [*before, "imu.saturated"]
+    verdict, reasons = calibrate_camera_imu._judged(
+        SimpleNamespace(quality=SimpleNamespace(verdict=libloc.Verdict.OK, reasons=["fine"])), findings
+    )
+    assert verdict == libloc.Verdict.WARN
+    assert reasons == ["fine", *(f.text for f in findings if f.severity == libloc.Verdict.WARN)]
 
 
 def test_imu_that_is_no_imu(files, waved, tmp_path, capsys):

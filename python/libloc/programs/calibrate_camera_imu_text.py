@@ -12,7 +12,12 @@ from libloc import Verdict
 from libloc.programs.calibrate_camera_imu_input import CameraImuInput
 from libloc.programs.calibrate_report import Table, with_sigma
 
-_INTRINSICS = ("fx [px]", "fy [px]", "cx [px]", "cy [px]", "d1", "d2", "d3", "d4")
+_INTRINSICS = ("fx [px]", "fy [px]", "cx [px]", "cy [px]")
+_DISTORTION = {
+    libloc.DistortionModel.RADTAN: ("k1", "k2", "p1", "p2"),
+    libloc.DistortionModel.EQUIDISTANT: ("k1", "k2", "k3", "k4"),
+    libloc.DistortionModel.NONE: (),
+}
 
 
 def _mounting_table(camera: libloc.CameraImuCamera) -> Table:
@@ -58,10 +63,12 @@ def _mounting_table(camera: libloc.CameraImuCamera) -> Table:
 
 def _intrinsics_table(camera: libloc.CameraImuCamera, refined: bool) -> Table:
     values = [*camera.camera.intrinsics_px, *camera.camera.distortion]
+    names = (*_INTRINSICS, *_DISTORTION[camera.camera.distortion_model])
+    # A lens without distortion has no rows for it.
     rows = [
         [name, with_sigma(value, sigma if refined else None), f"{sigma:.2g}", f"{change:+.3g}"]
         for name, value, sigma, change in zip(
-            _INTRINSICS, values, camera.intrinsics_sigma, camera.intrinsics_change, strict=True
+            names, values, camera.intrinsics_sigma, camera.intrinsics_change, strict=False
         )
     ]
     kind = "refined" if refined else "held"
@@ -103,12 +110,23 @@ def sentence_of(fit: libloc.CameraImuFit, verdict: Verdict) -> str:
         return f"Usable: {known}; see below what would make it better."
     if verdict == Verdict.WARN:
         return f"Doubtful: {known}, but something does not fit; see below before you use it."
+    if fit.stopped:
+        return "Do not use this result: it was stopped before its end; let it run to the end."
     return "Do not use this result: record once more as said below."
 
 
 def _check_text(check: libloc.CameraImuCheck, scale: float, unit: str) -> str:
     text = f"{with_sigma(check.value, check.sigma, scale)} {unit}"
     return text if check.estimated else f"held; one step from there says {text}"
+
+
+def _suggested_noise(noise: libloc.ImuNoise, fit: libloc.CameraImuFit) -> str:
+    """Densities with which the residuals are as large as they should be."""
+    gyro, accel = fit.gyroscope_noise_scale, fit.accelerometer_noise_scale
+    return (
+        f"gyroscope {noise.gyroscope_noise_density * gyro:.3g} rad/s/√Hz ({gyro:.2f} times what was given), "
+        f"accelerometer {noise.accelerometer_noise_density * accel:.3g} m/s²/√Hz ({accel:.2f} times)"
+    )
 
 
 def facts_of(data: CameraImuInput, fit: libloc.CameraImuFit, verdict: Verdict) -> list[tuple[str, str]]:
@@ -151,10 +169,10 @@ def facts_of(data: CameraImuInput, fit: libloc.CameraImuFit, verdict: Verdict) -
         ("bias of the accelerometer", " ".join(f"{x:.4f}" for x in bias[3:]) + " m/s² (mean)"),
         (
             "IMU residuals",
-            f"{fit.gyroscope_chi:.2f} and {fit.accelerometer_chi:.2f} of their deviation; suggested noise: "
-            f"densities of the gyroscope × {fit.gyroscope_noise_scale:.2f}, of the accelerometer × "
-            f"{fit.accelerometer_noise_scale:.2f}",
+            f"{fit.gyroscope_chi:.2f} (gyroscope) and {fit.accelerometer_chi:.2f} (accelerometer) of their "
+            "deviation; 1 is right",
         ),
+        ("suggested noise", _suggested_noise(data.noise, fit)),
         ("knots", f"{1e3 * fit.knot_spacing_s:.2f} ms apart; {fit.knot_reason}"),
         (
             "CPU time",
