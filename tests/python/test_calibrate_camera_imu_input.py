@@ -169,8 +169,12 @@ def test_saturation_is_seen_in_the_readings_as_read(files, waved):
     corners, imu, path = files
     target = libloc.CalibrationTarget("checkerboard 9x6 0.06")
     data = reading.read_input([corners, imu], [0], [path], None, target, InputOptions())
-    options = argparse.Namespace(target=target, force=False)
+    data.rate_hz = 100  # not what it is: 200
+    options = argparse.Namespace(target=target, force=False, step=1)
     before = [finding.code for finding in calibrate_camera_imu._lint(data, options)]
+    assert {"camera.rate_not_nominal", "imu.rate_not_nominal"} <= set(before)
+    options.step = 2  # asked for
+    before.remove("camera.rate_not_nominal")
     # The sensor's axes are not those of the body, where its limit is no single number.
     data.as_read = (np.clip(4 * waved.angular_velocity, -2, 2), waved.specific_force)
     findings = calibrate_camera_imu._lint(data, options)
@@ -235,6 +239,11 @@ def test_the_written_rig_fits_the_intrinsics(files, waved, tmp_path, capsys):
     text = run(capsys, corners, imu, *BOARD, "--rig", rig, "--out", out, code=1)
     assert "out.yaml: cam0 has other intrinsics there" in text
     assert out.read_bytes() == before
+    # Those that are refined are written with the mounting.
+    run(capsys, corners, imu, *BOARD, "--rig", rig, "--out", out, "--refine-intrinsics", "--force")
+    (found,) = libloc.read_rig(out).cameras
+    assert np.abs(found.intrinsics_px - a_camera().intrinsics_px).max() < 3
+    assert found.intrinsics_quality.method == "camera-imu"
     # Other cameras of the file stay.
     camera.name = "cam7"
     other.cameras = [camera]

@@ -208,6 +208,8 @@ def _lint(data: CameraImuInput, options: argparse.Namespace) -> list[libloc.Came
         data.noise,
         data.rate_hz,
     )
+    if options.step > 1:  # fewer pictures a second than the rig says is what was asked for
+        findings = [f for f in findings if f.code != "camera.rate_not_nominal"]
     if data.as_read is not None and not any(f.code == "imu.saturated" for f in findings):
         again = libloc.lint_camera_imu(
             options.target, [], data.times_ns, *data.as_read, data.noise, data.rate_hz
@@ -286,6 +288,11 @@ def outcome_of(
     verdict, reasons = _judged(fit, findings)
     names = [camera.camera.name for camera in fit.cameras]
     notes = [f.text for f in findings if f.severity in (Verdict.OK, Verdict.FAIR)] + data.notes
+    for camera in data.cameras:
+        reasons_of = sorted(camera.reasons.items(), key=lambda item: -item[1])
+        notes += [
+            f"{camera.camera.name}: no target in {count} pictures: {reason}" for reason, count in reasons_of
+        ]
     if fit.stopped:
         notes.append(f"the solution was stopped ({fit.stopped}): this is the best so far")
     return Outcome(
@@ -321,7 +328,8 @@ def _check_out(data: CameraImuInput, options: argparse.Namespace) -> None:
             used.height_px,
         )
         values = [np.array([*c.intrinsics_px, *c.distortion]) for c in (there, used)]
-        if not same or not np.allclose(*values, rtol=1e-9, atol=1e-12):
+        # Intrinsics that are refined are written, too.
+        if not same or not (options.refine_intrinsics or np.allclose(*values, rtol=1e-9, atol=1e-12)):
             raise DataError(
                 f"{options.out}: {used.name} has other intrinsics there than those of this calibration, "
                 "which the mounting would not fit: give this file with --rig, or name another with --out"
