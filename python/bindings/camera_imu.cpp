@@ -282,8 +282,13 @@ bool goes_on(const py::object& progress, const CameraImuProgress& at) {
     return false;
   }
   if (progress.is_none()) return true;
-  const py::object answer = progress(at);
-  return answer.is_none() || answer.cast<bool>();
+  try {
+    const py::object answer = progress(at);
+    return answer.is_none() || answer.cast<bool>();
+  } catch (py::error_already_set& error) {
+    if (!error.matches(PyExc_KeyboardInterrupt)) throw;
+    return false;
+  }
 }
 
 void bind_camera_imu_calibration(py::module_& m) {

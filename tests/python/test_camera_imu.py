@@ -163,6 +163,11 @@ def test_progress_stops_and_the_best_so_far_is_the_result(calibration, recording
     near = fit.cameras[0].T_camera_imu.translation - calibration.cameras[0].T_camera_imu.translation
     assert np.linalg.norm(near) < 0.02
 
+    def interrupt(at: libloc.CameraImuProgress) -> bool:
+        raise KeyboardInterrupt
+
+    assert libloc.calibrate_camera_imu(**recording, progress=interrupt).stopped == "interrupted"
+
     def fail(at: libloc.CameraImuProgress) -> bool:
         raise RuntimeError("from within")
 

@@ -61,6 +61,17 @@ def _mounting_table(camera: libloc.CameraImuCamera) -> Table:
     )
 
 
+def _correlation_table(camera: libloc.CameraImuCamera) -> Table:
+    """The covariance, with the deviations taken out: those stand above."""
+    names = ["turn x", "turn y", "turn z", "t x", "t y", "t z", "offset"]
+    correlation = camera.covariance / np.outer(camera.sigma, camera.sigma)
+    return Table(
+        f"correlations of the errors of {camera.camera.name} (turn about the IMU's axes, IMU in camera)",
+        ["", *names],
+        [[name, *(f"{x:.2f}" for x in row)] for name, row in zip(names, correlation, strict=True)],
+    )
+
+
 def _intrinsics_table(camera: libloc.CameraImuCamera, refined: bool) -> Table:
     values = [*camera.camera.intrinsics_px, *camera.camera.distortion]
     names = (*_INTRINSICS, *_DISTORTION[camera.camera.distortion_model])
@@ -188,7 +199,7 @@ def tables_of(fit: libloc.CameraImuFit, refined: bool, imu_matrices: bool) -> li
     """refined, imu_matrices: whether these were estimated."""
     tables: list[Table] = []
     for camera in fit.cameras:
-        tables += [_mounting_table(camera), _intrinsics_table(camera, refined)]
+        tables += [_mounting_table(camera), _correlation_table(camera), _intrinsics_table(camera, refined)]
         dropped = _dropped_table(camera)
         if dropped is not None:
             tables.append(dropped)
