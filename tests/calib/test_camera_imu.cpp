@@ -531,6 +531,25 @@ TEST(CameraImu, ABoardWithoutDirectionKeepsItsNumbers) {
   EXPECT_LT(in_sigmas(error_of(calibrate(gap), rig, 0), fit.cameras[0]).cwiseAbs().maxCoeff(), 6);
 }
 
+// Gauge: the target's frame, turned by half a turn, turns gravity and the way with it, and nothing else.
+TEST(CameraImu, TheFrameOfTheTargetDoesNotMatter) {
+  const WavedRig rig = wave({.seconds = 12}, 5);
+  WavedRig turned = rig;
+  for (TargetView& view : turned.views) {
+    for (TargetCorner& corner : view.corners) corner.id = rig.target.corner_count() - 1 - corner.id;
+    std::ranges::sort(view.corners, {}, &TargetCorner::id);
+  }
+  const CameraImuFit a = calibrate(rig);
+  const CameraImuFit b = calibrate(turned);
+  EXPECT_LT((error_of(a, rig, 0) - error_of(b, rig, 0)).norm(), 1e-6);
+  EXPECT_TRUE(
+      near(b.gravity_target, Vector3d(-a.gravity_target.x(), -a.gravity_target.y(), a.gravity_target.z()), 1e-5));
+  const Vector3d far_corner = rig.target.corner(rig.target.corner_count() - 1);
+  const Vector3d at = a.T_target_imu[1000].translation;
+  EXPECT_TRUE(
+      near(b.T_target_imu[1000].translation, Vector3d(far_corner.x() - at.x(), far_corner.y() - at.y(), at.z()), 1e-5));
+}
+
 TEST(CameraImu, SamplesAndPicturesThatCannotBeUsedAreCounted) {
   WavedRig rig = wave({.seconds = 12}, 2);
   const CameraImuFit clean = calibrate(rig);
