@@ -121,10 +121,9 @@ CameraImuState first_state(const CameraImuRecording& recording, const calib::Cha
   const RoughAttitude attitude(gyro, start, poses);
   std::vector<double> times;
   std::vector<Pose3> samples;
-  const double step = plan.grid.spacing_s / 2;
-  for (double t = plan.grid.start_s; t <= plan.grid.end_s(); t += step) {
-    times.push_back(t);
-    samples.push_back({attitude.at(t), Vector3d::Zero()});
+  for (int i = 0; i <= 2 * plan.grid.segments; ++i) {  // two in a segment
+    times.push_back(plan.grid.start_s + i * plan.grid.spacing_s / 2);
+    samples.push_back({attitude.at(times.back()), Vector3d::Zero()});
   }
   if (state.form == RotationForm::kThreeAngles) {
     state.mean = mean_rotation(attitude.rotations());
@@ -361,8 +360,8 @@ calib::SharedEquations equations_of(const CameraImuProblem& problem, const Camer
   out.information = system.shared_information();
   const int windows = problem.plan().windows;
   const int groups = std::clamp(windows / kWindowsPerGroup, std::min(windows, kLeastGroups), kMostGroups);
-  std::vector<int> group;
-  for (int w = 0; w < windows; ++w) group.push_back(w * groups / windows);
+  std::vector<int> group(static_cast<std::size_t>(windows));
+  for (int w = 0; w < windows; ++w) group[static_cast<std::size_t>(w)] = w * groups / windows;
   out.pulls = system.shared_pulls(group, groups);
   return out;
 }

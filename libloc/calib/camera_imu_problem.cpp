@@ -578,14 +578,13 @@ Pose3 CameraImuProblem::pose_at(const CameraImuState& state, double t_s) const {
     return {angles_at(state.mean, state.angles.middleCols(segment, k), w, nullptr).rotation, position};
   }
   std::vector<RotationStep> steps;
-  for (int j = 0; j + 1 < k; ++j) {
-    const auto at = static_cast<std::size_t>(segment + j);
+  const auto first = static_cast<std::size_t>(segment);
+  for (std::size_t at = first; at + 1 < first + static_cast<std::size_t>(k); ++at) {
     steps.push_back(step_between(state.rotations[at], state.rotations[at + 1]));
   }
-  return {rotation_at(state.rotations[static_cast<std::size_t>(segment)], steps,
-                      cumulative_weights_at(k, plan_.grid.spacing_s, u), nullptr)
-              .rotation,
-          position};
+  return {
+      rotation_at(state.rotations[first], steps, cumulative_weights_at(k, plan_.grid.spacing_s, u), nullptr).rotation,
+      position};
 }
 
 MatrixXd CameraImuProblem::imu_residuals(const CameraImuState& state) const {

@@ -104,25 +104,34 @@ std::vector<Peak> peaks_of(const OffsetCurve& curve) {
 // Norms of the turn rates know nothing of the rotation between the sensors; all offsets are tried at which half of the
 // pictures (or of the shorter recording) have IMU samples.
 OffsetCurve correlate(const std::vector<Turn>& turns, const MeanRate& gyro, double low_s, double high_s) {
-  std::vector<double> lengths;
-  for (const Turn& turn : turns) lengths.push_back(turn.to_s - turn.from_s);
+  std::vector<double> lengths(turns.size());
+  std::vector<double> speeds(turns.size());
+  std::vector<double> middles(turns.size());
+  for (std::size_t i = 0; i < turns.size(); ++i) {
+    lengths[i] = turns[i].to_s - turns[i].from_s;
+    speeds[i] = turns[i].rate.norm();
+    middles[i] = (turns[i].from_s + turns[i].to_s) / 2;
+  }
   const double step = quantile(lengths, 0.5);
   const double h = step / 8;
-  std::vector<double> norms;
-  for (double t = gyro.begin_s() + step / 2; t <= gyro.end_s() - step / 2; t += h) {
-    norms.push_back(gyro.between(t - step / 2, t + step / 2).norm());
-  }
   const double first = gyro.begin_s() + step / 2;
+  std::vector<double> norms(static_cast<std::size_t>(std::max(0.0, (gyro.end_s() - gyro.begin_s() - step) / h)) + 1);
+  for (std::size_t i = 0; i < norms.size(); ++i) {
+    const double t = first + static_cast<double>(i) * h;
+    norms[i] = gyro.between(t - step / 2, t + step / 2).norm();
+  }
   const double seen = turns.back().to_s - turns.front().from_s;
   const double possible = std::min(1.0, (gyro.end_s() - gyro.begin_s()) / seen);
   const double needed = std::max<double>(kLeastSteps, kLeastOverlap * possible * static_cast<double>(turns.size()));
   OffsetCurve out;
-  for (double d = low_s; d <= high_s; d += h) {
+  const auto offsets = static_cast<std::int64_t>((high_s - low_s) / h);
+  for (std::int64_t k = 0; k <= offsets; ++k) {
+    const double d = low_s + static_cast<double>(k) * h;
     PairSums sums;
-    for (const Turn& turn : turns) {
-      const double at = ((turn.from_s + turn.to_s) / 2 + d - first) / h;
-      if (at < -0.5 || at > static_cast<double>(norms.size()) - 0.5) continue;
-      sums.add(turn.rate.norm(), norms[static_cast<std::size_t>(std::lround(std::max(at, 0.0)))]);
+    for (std::size_t i = 0; i < turns.size(); ++i) {
+      const double at = (middles[i] + d - first) / h;
+      if (at < -0.5 || at >= static_cast<double>(norms.size()) - 0.5) continue;
+      sums.add(speeds[i], norms[static_cast<std::size_t>(std::lround(std::max(at, 0.0)))]);
     }
     if (sums.n < needed) continue;
     out.offset_s.push_back(d);
