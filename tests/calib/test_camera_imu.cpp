@@ -374,6 +374,10 @@ TEST(CameraImu, TellsWhatItSaw) {
                                          }});
   EXPECT_FALSE(stopped.converged);
   EXPECT_EQ(stopped.stopped, "interrupted");
+  const CameraImuFit late = calibrate(rig, {.time_limit_s = 1e-6});
+  EXPECT_EQ(late.stopped, "time limit");
+  EXPECT_EQ(late.iterations, 1);
+  EXPECT_EQ(late.quality.verdict, Verdict::kRefused);
   EXPECT_EQ(stopped.quality.verdict, Verdict::kRefused);
   EXPECT_TRUE(near(stopped.cameras[0].T_camera_imu.translation, fit.cameras[0].T_camera_imu.translation, 0.01));
 }
