@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from libloc.programs import calibrate
 from libloc.programs import calibrate_camera_imu_live as live
+from libloc.programs.calibrate_camera_imu_turns import rotation_of
 from test_calibrate_live import hub, wait_for
 from waved_rig import Waved, a_camera
 
@@ -37,14 +38,14 @@ def collected_of(rig: Waved, seconds: float = 1e9) -> live.Collected:
     return out
 
 
-def fit_of(rig: Waved, collected: live.Collected) -> libloc.CameraImuFit:
+def fit_of(rig: Waved, collected: live.Collected, **options) -> libloc.CameraImuFit:
     return libloc.calibrate_camera_imu(
         rig.target,
         [libloc.CameraRecording(rig.cameras[0], collected.views)],
         collected.imu_times_ns,
         collected.angular_velocity,
         collected.specific_force,
-        options=libloc.CameraImuOptions(adapt_noise=False, check_line_delay=False),
+        options=libloc.CameraImuOptions(adapt_noise=False, check_line_delay=False, **options),
     )
 
 
@@ -55,10 +56,12 @@ def test_advice_follows_what_is_missing():
     one = collected_of(Waved(seconds=8, turning=(1, 0.01, 0.01)))
     spread, weakest = one.turning()
     assert np.linalg.norm(weakest) < 0.02 < spread.max()
-    advice = live.advice_of(one, None, "", 0)
-    assert "turn it about the IMU's" in advice.text
-    # The camera's x is turned about: the IMU's z the least of all (it is the camera's -x no longer).
-    named = advice.text.split("IMU's ")[1].split(" axis")[0].split(" and ")
+    assert (
+        "forward" in live.advice_of(one, None, "", 0).text or "down" in live.advice_of(one, None, "", 0).text
+    )
+    # Too few pictures to tell the camera's axes: those of the IMU.
+    one.turns.count = 0
+    named = live.advice_of(one, None, "", 0).text.split("IMU's ")[1].split(" axis")[0].split(" and ")
     assert set(named) <= {"x", "y", "z"}
     corner = collected_of(whole)
     corner.cells[:, 4:] = 0
@@ -79,11 +82,82 @@ def test_advice_follows_what_is_missing():
     assert offset < 0.1
     assert not live.advice_of(good, fit, "", 1).enough
     assert live.advice_of(good, fit, "", 2).enough
+    # A solution that is none has small deviations too.
+    bad = fit_of(whole, good, max_iterations=1)
+    assert not bad.converged
+    assert max(live.deviations(bad)) < 2
+    assert not live.is_small(bad)
+    assert not live.advice_of(good, bad, "", 2).enough
     # Enough is never said of less than 20 s.
     assert not live.advice_of(collected_of(whole, 15), fit, "", 2).enough
     assert 0.4 < good.coverage() <= 1
     figure = live.plot_progress(good, live.Advice("go on"))
     assert len(figure.axes) == 3
+
+
+@pytest.mark.parametrize(
+    ("turning", "words"),
+    [
+        ((1, 1, 0), "forward: roll"),
+        ((0, 1, 1), "to the right of the image: nod"),
+        ((1, 0, 1), "down the image: swing"),
+    ],
+)
+def test_the_cameras_axis_that_is_missing_is_named(turning, words):
+    """Waved turns about the camera's x, y and z."""
+    advice = live.advice_of(collected_of(Waved(seconds=8, turning=turning, imu_hz=50)), None, "", 0)
+    assert words in advice.text
+
+
+def test_rotation_of_the_target_in_the_camera():
+    rig = Waved(seconds=3)
+    camera = libloc.Camera(rig.cameras[0])
+    for t, view in list(zip(rig.picture_times()[0], rig.views(), strict=True))[::7]:
+        R = rotation_of(rig.points[view.ids], camera.unproject(view.pixels_px))
+        truth = rig.camera_pose(t).inverse().matrix()[:3, :3]
+        assert np.rad2deg(np.arccos((np.trace(R.T @ truth) - 1) / 2)) < 3
+    line = np.column_stack([np.arange(10), np.zeros((10, 2))]) * 0.1
+    assert rotation_of(line, line + np.array([0, 0, 1])) is None
+    assert rotation_of(rig.points[:7], np.tile([0, 0, 1.0], (7, 1))) is None
+
+
+def test_advice_looks_at_the_last_seconds():
+    """However good it was before."""
+    good = collected_of(Waved(seconds=12))
+    end = good.imu_times_ns[-1]
+    assert good.latest_turning() > 0.5
+    for i in range(1, 400):
+        good.add_imu(int(end) + i * 10**7, [0.01, -0.02, np.nan if i == 5 else 0.005], [0, 0, 9.8])
+    assert good.latest_turning() < 0.03
+    assert live.advice_of(good, None, "", 0).text.startswith("turn faster")
+    nothing = Seen(libloc.TargetView(np.zeros(0, np.int64), np.zeros((0, 2))), "no board")
+    for i in range(8):
+        good.add_detection(int(end) + i * 10**8, nothing)
+    assert "not seen any more (no board)" in live.advice_of(good, None, "", 0).text
+
+
+@needs_vision
+def test_pictures_of_another_size_end_it():
+    rig = Waved(seconds=1)
+    picture = loc.image_t()
+    picture.width, picture.height, picture.row_stride = 320, 200, 320
+    picture.pixelformat, picture.data, picture.size = picture.PIXEL_FORMAT_GRAY, bytes(64000), 64000
+
+    class Options:
+        camera = (0,)
+        image_channel, imu_channel, patience = libloc.IMAGE_CHANNEL, libloc.IMU_CHANNEL, 1e9
+
+    collected = live.Collected(rig.target, rig.cameras[0])
+    session = live._Session(Options(), collected, live._detector(rig.target, rig.cameras[0]), fit_of)
+    session.take(libloc.IMAGE_CHANNEL, picture.encode())
+    with pytest.raises(libloc.DataError, match="320 x 200 pixels come; cam0 of the rig has 640 x 400"):
+        session.finish()
+    # A damaged one is counted.
+    picture.data, picture.size = bytes(100), 100
+    session.take(libloc.IMAGE_CHANNEL, picture.encode())
+    session.finish()
+    session.close()
+    assert collected.counts["images.skipped.damaged"] == 1
 
 
 def test_no_imu_sample_waits_for_a_slow_detector():

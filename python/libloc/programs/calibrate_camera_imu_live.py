@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 import libloc
 from libloc import DataError
 from libloc.lcm_receiver import LcmReceiver
+from libloc.programs.calibrate_camera_imu_turns import CameraTurns
 from libloc.programs.calibrate_images import of_message
 from libloc.programs.calibrate_live import DEFAULT_URL
 from libloc.programs.calibrate_plots import new_figure
@@ -39,6 +40,13 @@ _LEAST_S = 20.0  # of data, before it is enough
 _LEAST_TURNING = 0.15  # rms of the turn rate along the weakest axis [rad/s]
 _LEAST_COVERAGE = 0.4  # of the cells
 _LEAST_SEEN = 0.5  # of the pictures
+_LATEST_S, _SLOW = 3.0, 0.15  # rms of the turn rate of the last seconds [rad/s]
+_UNSEEN = 8  # pictures in a row
+_ABOUT = (
+    "that points to the right of the image: nod it up and down",
+    "that points down the image: swing it left and right",
+    "that points forward: roll it like a steering wheel",
+)
 _ENOUGH_DEG, _ENOUGH_MM, _ENOUGH_MS = 0.1, 2.0, 0.1
 _CONFIRMATIONS = 2
 
@@ -77,6 +85,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+class OtherSizeError(DataError):
+    """A picture that the camera's intrinsics do not hold for: no use in going on."""
+
+
 @dataclass
 class Advice:
     text: str
@@ -95,9 +107,15 @@ class Collected:
     reasons: Counter[str] = field(default_factory=Counter)  # why the target was not found
     counts: Counter[str] = field(default_factory=Counter)
     left_out: int = 0
+    unseen: int = 0  # pictures in a row without the target
+    turns: CameraTurns = field(init=False)
+    _seen_ns: list[int] = field(default_factory=list)  # first and last with the target
     _times: list[int] = field(default_factory=list)
     _rows: list[tuple[float, ...]] = field(default_factory=list)
     _sequence: dict[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.turns = CameraTurns(self.target, self.camera)
 
     def note_sequence(self, name: str, sequence: int) -> None:
         self.counts[f"{name}.received"] += 1
@@ -117,7 +135,11 @@ class Collected:
         self.views.append(libloc.TargetView(seen.view.ids, pixels, time_ns))
         if len(seen.view) == 0:
             self.reasons[seen.reason] += 1
+            self.unseen += 1
             return
+        self.unseen = 0
+        self._seen_ns = [*self._seen_ns[:1], time_ns]
+        self.turns.add(self.views[-1])
         self.counts["images.with_target"] += 1
         size = (self.camera.width_px, self.camera.height_px)
         at = np.floor((pixels + 0.5) / size * (_COLUMNS, _ROWS)).astype(int)
@@ -138,8 +160,16 @@ class Collected:
 
     def seconds(self) -> float:
         """Of pictures that show the target, from the first to the last."""
-        times = [v.time_ns for v in self.views if len(v)]
-        return (times[-1] - times[0]) * 1e-9 if times else 0.0
+        return (self._seen_ns[-1] - self._seen_ns[0]) * 1e-9 if self._seen_ns else 0.0
+
+    def latest_turning(self) -> float:
+        """Root mean square of the turn rate [rad/s] in the last seconds; NaN without samples."""
+        first = len(self._times)
+        while first > 0 and self._times[-1] - self._times[first - 1] < _LATEST_S * 1e9:
+            first -= 1
+        rates = np.array(self._rows[first:], dtype=float).reshape(-1, 6)[:, :3]
+        rates = rates[np.isfinite(rates).all(axis=1)]
+        return float(np.sqrt(np.sum(rates**2, axis=1).mean())) if len(rates) else np.nan
 
     def turning(self) -> tuple[Array, Array]:
         """Deviations of the turn rate [rad/s] about the IMU's axes, and the axis with the least."""
@@ -180,8 +210,15 @@ def advice_of(collected: Collected, fit: libloc.CameraImuFit | None, failure: st
         )
     if collected.seconds() < 5:
         return Advice("wave the rig: turn it about all axes and move it, the target in view")
+    if collected.unseen >= _UNSEEN:
+        return Advice(f"the target is not seen any more ({collected.reasons.most_common(1)[0][0]}): show it")
+    if collected.latest_turning() < _SLOW:
+        return Advice("turn faster: it need not be held still")
     spread, weakest = collected.turning()
     if np.linalg.norm(weakest) < _LEAST_TURNING:
+        named = collected.turns.weakest()
+        if named is not None:
+            return Advice(f"turn it briskly about the axis {_ABOUT[named]}")
         axis = _axis_name(weakest) if np.linalg.norm(weakest) > 0 else _axis_name(1 / (spread + 1e-9))
         return Advice(f"turn it about the IMU's {axis} axis too, and briskly")
     if collected.coverage() < _LEAST_COVERAGE:
@@ -190,8 +227,7 @@ def advice_of(collected: Collected, fit: libloc.CameraImuFit | None, failure: st
         return Advice(failure)
     if fit is None:
         return Advice("go on")
-    turn, shift, offset = deviations(fit)
-    small = turn < _ENOUGH_DEG and shift < _ENOUGH_MM and offset < _ENOUGH_MS
+    small = is_small(fit)
     if small and collected.seconds() >= _LEAST_S and confirmed >= _CONFIRMATIONS:
         return Advice("enough now", enough=True)
     if small:
@@ -209,6 +245,14 @@ def deviations(fit: libloc.CameraImuFit) -> tuple[float, float, float]:
         float(1e3 * np.linalg.norm(sigma[3:6])),
         float(1e3 * sigma[6]),
     )
+
+
+def is_small(fit: libloc.CameraImuFit) -> bool:
+    """Deviations of a solution that is none mean nothing."""
+    if not fit.converged or fit.quality.verdict == libloc.Verdict.REFUSED:
+        return False
+    turn, shift, offset = deviations(fit)
+    return turn < _ENOUGH_DEG and shift < _ENOUGH_MM and offset < _ENOUGH_MS
 
 
 def _map_of(cells: NDArray[np.int64], encoding: str | None) -> list[str]:
@@ -249,7 +293,9 @@ class _Display:
         ]
         up = f"\x1b[{self._height}A" if self._height else ""
         self._height = len(lines)
-        print(up + "\n".join(f"\x1b[2K{line}" for line in lines), file=self._stream, flush=True)
+        # Long lines are cut off, not wrapped: the cursor goes up by lines of the screen.
+        text = "\n".join(f"\x1b[2K{line}" for line in lines)
+        print(f"{up}\x1b[?7l{text}\x1b[?7h", file=self._stream, flush=True)
 
 
 def plot_progress(collected: Collected, advice: Advice) -> Figure:
@@ -363,6 +409,8 @@ class _Session:
             self._detection = None
             try:
                 collected.add_detection(time_ns, found.result())
+            except OtherSizeError:
+                raise
             except DataError:
                 collected.counts["images.skipped.damaged"] += 1
         if self._detection is None and self._waiting is not None:
@@ -387,10 +435,7 @@ class _Session:
             time.sleep(0.002)
 
     def _is_small(self) -> bool:
-        if self.fit is None or self.failure:
-            return False
-        turn, shift, offset = deviations(self.fit)
-        return turn < _ENOUGH_DEG and shift < _ENOUGH_MM and offset < _ENOUGH_MS
+        return self.fit is not None and not self.failure and is_small(self.fit)
 
     def advice(self) -> Advice:
         return advice_of(self.collected, self.fit, self.failure, self.confirmed)
@@ -410,9 +455,22 @@ def _copy(collected: Collected) -> Collected:
     return out
 
 
-def _detector(target: libloc.CalibrationTarget) -> Callable[[Any, str], libloc.TargetDetection]:
+def _detector(
+    target: libloc.CalibrationTarget, camera: libloc.CameraCalibration
+) -> Callable[[Any, str], libloc.TargetDetection]:
     detector = libloc.TargetDetector(target, thorough=False)
-    return lambda picture, where: detector.detect(of_message(picture, where))
+
+    def detect(picture: Any, where: str) -> libloc.TargetDetection:
+        grey = of_message(picture, where)
+        height, width = grey.shape
+        if (width, height) != (camera.width_px, camera.height_px):
+            raise OtherSizeError(
+                f"pictures of {width} x {height} pixels come; {camera.name} of the rig has "
+                f"{camera.width_px} x {camera.height_px}: intrinsics hold for one size only"
+            )
+        return detector.detect(grey)
+
+    return detect
 
 
 def collect(
@@ -428,7 +486,7 @@ def collect(
     """
     stream = stream or sys.stderr
     collected = Collected(target, camera, f"live on {options.lcm_url}")
-    session = _Session(options, collected, _detector(target), solve)
+    session = _Session(options, collected, _detector(target, camera), solve)
     display = _Display(stream)
     start = time.monotonic()
     next_line, next_picture = start + _LINE_S, start + _PICTURE_S
@@ -465,9 +523,9 @@ def collect(
                 if options.report and now >= next_picture:
                     next_picture = now + _PICTURE_S
                     _write_picture(options.report, collected, advice)
+        session.finish()
     except KeyboardInterrupt:
         why = "interrupted"
-    try:
         session.finish()
     finally:
         session.close()
@@ -475,8 +533,11 @@ def collect(
         collected.counts["connections.lost"] = receiver.connections_lost
     for name, what in (("images.received", options.image_channel), ("imu.received", options.imu_channel)):
         if not collected.counts[name]:
+            others = collected.counts["images.of_other_cameras"] if name == "images.received" else 0
+            hint = f"{others} pictures of other cameras did (--camera)" if others else ""
             raise DataError(
-                f"nothing came on {what} ({options.lcm_url}): {why}; does loc-driver send both there?"
+                f"nothing came on {what} ({options.lcm_url}): {why}; "
+                + (hint or "does loc-driver send both there?")
             )
     print(f"collecting ended: {why}", file=stream)
     if options.report:
