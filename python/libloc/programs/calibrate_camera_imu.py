@@ -51,6 +51,8 @@ _SEVERITIES = {
     Verdict.REFUSED: "error",
 }
 
+_QUICK_LIMIT_S = 20.0  # of a solution while more is collected
+
 
 def _positive(text: str) -> float:
     value = float(text)
@@ -383,7 +385,7 @@ def _collect(options: argparse.Namespace) -> CameraImuInput:
             rates,
             forces,
             noise,
-            libloc.CameraImuOptions(adapt_noise=False, check_line_delay=False),
+            libloc.CameraImuOptions(adapt_noise=False, check_line_delay=False, time_limit_s=_QUICK_LIMIT_S),
         )
 
     found = live.collect(options, options.target, camera, quick)

@@ -429,7 +429,8 @@ class _Session:
             self._solution = self._workers.submit(self._solve, _copy(collected))
 
     def finish(self) -> None:
-        """Looks at the pictures that are left."""
+        """Looks at the picture that is left; nothing more is solved."""
+        self._next_fit_s = float("inf")
         while self._detection is not None or self._waiting is not None:
             self.work()
             time.sleep(0.002)
@@ -496,36 +497,38 @@ def collect(
     channels = [options.image_channel, options.imu_channel, libloc.SOURCE_STATUS_CHANNEL]
     receiver = LcmReceiver(options.lcm_url, channels, lambda *message: messages.put(message))
     try:
-        with receiver:
-            while time.monotonic() - start < options.duration:
-                try:
-                    session.take(*messages.get(timeout=0.01))
-                    empty = False
-                except queue.Empty:
-                    empty = True
-                session.work()
-                silent = session.silent()
-                if silent:
-                    why = silent
-                    break
-                if session.ended and empty:
-                    why = session.ended
-                    break
-                now = time.monotonic()
-                if now < next_line:
-                    continue
-                next_line = now + _LINE_S
-                advice = session.advice()
-                display.show(collected, session.fit, advice)
-                if advice.enough:
-                    why = advice.text
-                    break
-                if options.report and now >= next_picture:
-                    next_picture = now + _PICTURE_S
-                    _write_picture(options.report, collected, advice)
-        session.finish()
-    except KeyboardInterrupt:
-        why = "interrupted"
+        try:
+            with receiver:
+                while time.monotonic() - start < options.duration:
+                    try:
+                        session.take(*messages.get(timeout=0.01))
+                        empty = False
+                    except queue.Empty:
+                        empty = True
+                    session.work()
+                    silent = session.silent()
+                    if silent:
+                        why = silent
+                        break
+                    if session.ended and empty:
+                        why = session.ended
+                        break
+                    now = time.monotonic()
+                    if now < next_line:
+                        continue
+                    next_line = now + _LINE_S
+                    advice = session.advice()
+                    display.show(collected, session.fit, advice)
+                    if advice.enough:
+                        why = advice.text
+                        break
+                    if options.report and now >= next_picture:
+                        next_picture = now + _PICTURE_S
+                        _write_picture(options.report, collected, advice)
+        except KeyboardInterrupt:
+            why = "interrupted"
+        while not messages.empty():  # what came before the end counts
+            session.take(*messages.get())
         session.finish()
     finally:
         session.close()
