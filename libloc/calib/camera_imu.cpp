@@ -505,9 +505,10 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
   fit.gravity_target = state.gravity;
   fit.gyroscope_matrix = state.gyro_matrix;
   fit.accelerometer_matrix = state.accel_matrix;
-  calib::put_deviations(equations_of(problem, state, choice, options), state, intrinsics_sigma, fit);
+  const std::vector<Vector8d> change_sigma =
+      calib::put_deviations(equations_of(problem, state, choice, options), state, intrinsics_sigma, fit);
   put_residuals(problem, state, recording.origin, cameras, options.loss_sigmas, fit);
-  calib::judge(options, knots.too_fast, end - begin, fit);
+  calib::judge(options, change_sigma, knots.too_fast, end - begin, fit);
   fit.solve_cpu_s = cpu_s() - solve_begin;
   return fit;
 }

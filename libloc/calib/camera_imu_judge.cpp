@@ -18,6 +18,8 @@ using Eigen::VectorXd;
 constexpr double kLeastPivot = 1e-13;
 constexpr double kAlikePeaks = 0.9;
 constexpr double kDoubtfulNoise = 3;
+constexpr double kNoNoise = 20;         // from here on it is not noise
+constexpr double kOtherGravity = 0.01;  // as a share
 constexpr double kPulledApart = 2;
 constexpr double kByChance = 2;  // deviations
 // Deviations from which what was held is something else. What was held wrongly also pulls pieces of the recording
@@ -118,21 +120,24 @@ CameraImuCheck check_of(const SharedEquations& e, const Part& estimated, int pla
   return out;
 }
 
-void put_intrinsics(const SharedEquations& e, const Part& estimated, std::size_t c, const Vector8d& sigma,
-                    CameraImuCamera& camera, Matrix7d& covariance) {
+// @returns the deviations of the change that the recording would make
+Vector8d put_intrinsics(const SharedEquations& e, const Part& estimated, std::size_t c, const Vector8d& sigma,
+                        CameraImuCamera& camera, Matrix7d& covariance) {
+  Vector8d change_sigma = Vector8d::Zero();
   const SharedLayout::OfCamera& all = e.all.cameras[c];
   const int size = all.intrinsics_size;
   std::vector<int> own;
   append(own, all.intrinsics, size);
   if (e.estimated.cameras[c].intrinsics >= 0) {
     for (int i = 0; i < size; ++i) camera.intrinsics_sigma[i] = estimated.sigma(own[static_cast<std::size_t>(i)]);
-    return;
+    return change_sigma;
   }
   camera.intrinsics_sigma.head(size) = sigma.head(size);
   std::vector<int> places = estimated.places;
   places.insert(places.end(), own.begin(), own.end());
   const Part with = solve_for(e, std::move(places));
   camera.intrinsics_change.head(size) = with.step.tail(size);
+  for (int i = 0; i < size; ++i) change_sigma[i] = with.sigma(own[static_cast<std::size_t>(i)]);
   // How the mounting moves with the intrinsics that are held.
   const MatrixXd all_moves = dense::product(-estimated.covariance, e.information(estimated.places, own));
   const MatrixXd moves = all_moves.middleRows<kMountingSize>(estimated.at(all.first));
@@ -140,10 +145,11 @@ void put_intrinsics(const SharedEquations& e, const Part& estimated, std::size_t
   const MatrixXd by_intrinsics = dense::compose(moves, sigma.head(size).cwiseAbs2());
   camera.sigma_by_intrinsics = by_intrinsics.diagonal().cwiseSqrt();
   covariance += by_intrinsics;
+  return change_sigma;
 }
 
-void judge_camera(const CameraImuOptions& options, const CameraImuCamera& camera, double length_s, bool several,
-                  Quality& q) {
+void judge_camera(const CameraImuOptions& options, const CameraImuCamera& camera, const Vector8d& change_sigma,
+                  double length_s, bool several, Quality& q) {
   const std::string of = several ? " of " + camera.camera.name : "";
   // First what was held wrongly: it spoils all that follows.
   const CameraImuCheck& line = camera.line_delay_s;
@@ -160,6 +166,14 @@ void judge_camera(const CameraImuOptions& options, const CameraImuCamera& camera
     q.lower_to(Verdict::kWarn, "The clocks" + of + " drift apart by " + to_text(1e6 * drift.value, 2) +
                                    " us a second: the offset holds for the middle of the recording only. Put both on "
                                    "one clock, or let the drift be estimated.");
+  }
+  const double pull = camera.intrinsics_change.head<4>().cwiseAbs().maxCoeff();
+  if (!options.refine_intrinsics && pull > kIntrinsicsPull &&
+      (camera.intrinsics_change.head<4>().cwiseAbs2().array() >
+       9 * (camera.intrinsics_sigma.head<4>().cwiseAbs2() + change_sigma.head<4>().cwiseAbs2()).array())
+          .any()) {
+    q.lower_to(Verdict::kFair, "This recording would change the intrinsics" + of + " by up to " + to_text(pull, 2) +
+                                   " px, more than their deviations allow: are they of this camera, lens and focus?");
   }
   const auto by_size = [&](double value, double fair, double warn, double refused, const std::string& text) {
     if (value < fair) return;
@@ -187,12 +201,6 @@ void judge_camera(const CameraImuOptions& options, const CameraImuCamera& camera
                                    " times more than noise can (blurred pictures, the lens at the image's edge, "
                                    "coloured residuals of the IMU); the deviations take that into account.");
   }
-  const double pull = camera.intrinsics_change.head<4>().cwiseAbs().maxCoeff();
-  if (!options.refine_intrinsics && pull > kIntrinsicsPull &&
-      (camera.intrinsics_change.head<4>().array().abs() > 3 * camera.intrinsics_sigma.head<4>().array()).any()) {
-    q.lower_to(Verdict::kFair, "This recording would change the intrinsics" + of + " by up to " + to_text(pull, 2) +
-                                   " px, more than their deviations allow: are they of this camera, lens and focus?");
-  }
   const auto used = std::ranges::count_if(camera.views, &CameraImuView::used);
   if (2 * used < static_cast<std::ptrdiff_t>(camera.views.size())) {
     q.lower_to(Verdict::kFair, "Only " + std::to_string(used) + " of " + std::to_string(camera.views.size()) +
@@ -202,10 +210,11 @@ void judge_camera(const CameraImuOptions& options, const CameraImuCamera& camera
 
 }  // namespace
 
-void put_deviations(const SharedEquations& e, const CameraImuState& state, std::span<const Vector8d> intrinsics_sigma,
-                    CameraImuFit& fit) {
+std::vector<Vector8d> put_deviations(const SharedEquations& e, const CameraImuState& state,
+                                     std::span<const Vector8d> intrinsics_sigma, CameraImuFit& fit) {
   const Part estimated = solve_for(e, estimated_places(e));
   if (!estimated.by_noise.allFinite()) throw DataError("the recording does not determine the calibration");
+  std::vector<Vector8d> change_sigma;
   for (std::size_t c = 0; c < fit.cameras.size(); ++c) {
     CameraImuCamera& camera = fit.cameras[c];
     const SharedLayout::OfCamera& all = e.all.cameras[c];
@@ -218,7 +227,7 @@ void put_deviations(const SharedEquations& e, const CameraImuState& state, std::
       grown[i] = growth_by_blocks(camera.sigma_by_noise[i], camera.sigma_by_blocks[i], estimated.groups);
     }
     camera.covariance = grown.asDiagonal() * estimated.covariance.block<7, 7>(at, at) * grown.asDiagonal();
-    put_intrinsics(e, estimated, c, intrinsics_sigma[c], camera, camera.covariance);
+    change_sigma.push_back(put_intrinsics(e, estimated, c, intrinsics_sigma[c], camera, camera.covariance));
     camera.sigma = camera.covariance.diagonal().cwiseSqrt();
     camera.line_delay_s = check_of(e, estimated, all.line_delay, own.line_delay >= 0, state.cameras[c].line_delay_s);
     camera.offset_drift = check_of(e, estimated, all.drift, own.drift >= 0, state.cameras[c].drift);
@@ -234,23 +243,35 @@ void put_deviations(const SharedEquations& e, const CameraImuState& state, std::
       for (Index b = 0; b <= a; ++b) fit.accelerometer_matrix_sigma(a, b) = estimated.sigma(accel++);
     }
   }
+  return change_sigma;
 }
 
-void judge(const CameraImuOptions& options, bool too_fast, double length_s, CameraImuFit& fit) {
+void judge(const CameraImuOptions& options, std::span<const Vector8d> change_sigma, bool too_fast, double length_s,
+           CameraImuFit& fit) {
   Quality& q = fit.quality;
   if (!fit.converged) {
     q.lower_to(Verdict::kRefused, "The solution has not settled" +
                                       (fit.stopped.empty() ? std::string() : " (" + fit.stopped + ")") +
                                       ": give it more time, or a better recording.");
   }
-  for (const CameraImuCamera& camera : fit.cameras) {
-    judge_camera(options, camera, length_s, fit.cameras.size() > 1, q);
+  const CameraImuCheck& gravity = fit.gravity_size;
+  if (!gravity.estimated && std::abs(gravity.value - options.gravity) > kSignificant * gravity.sigma &&
+      std::abs(gravity.value / options.gravity - 1) > kOtherGravity) {
+    q.lower_to(Verdict::kWarn, "Gravity seems to be " + to_text(gravity.value, 4) + " m/s^2, not " +
+                                   to_text(options.gravity, 4) +
+                                   ": is the target as large as it was said to be, and the accelerometer calibrated?");
   }
-  const double noise = std::max(fit.gyroscope_noise_scale, fit.accelerometer_noise_scale);
-  if (noise > kDoubtfulNoise) {
-    q.lower_to(Verdict::kFair, "The IMU is " + to_text(noise, 2) +
-                                   " times as noisy as its densities say: check them and the units, or take a closer "
-                                   "knot spacing if it was shaken.");
+  const auto noisy = [&](double scale, const std::string& sensor) {
+    if (scale < kDoubtfulNoise) return;
+    q.lower_to(scale < kNoNoise ? Verdict::kFair : Verdict::kWarn,
+               "The " + sensor + " fits " + to_text(scale, 2) +
+                   " times worse than its noise density says: check the density, its unit and axes, gravity and the "
+                   "target's size, or take a closer knot spacing if the rig was shaken.");
+  };
+  noisy(fit.gyroscope_noise_scale, "gyroscope");
+  noisy(fit.accelerometer_noise_scale, "accelerometer");
+  for (std::size_t c = 0; c < fit.cameras.size(); ++c) {
+    judge_camera(options, fit.cameras[c], change_sigma[c], length_s, fit.cameras.size() > 1, q);
   }
   if (too_fast) {
     q.lower_to(Verdict::kWarn, "The rig was moved faster than the knots can follow (" + fit.knot_reason +

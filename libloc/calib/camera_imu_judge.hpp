@@ -21,10 +21,13 @@ struct SharedEquations {
 
 /// Deviations and covariance of each camera's mounting, and what was held: one step from where it is.
 /// @param intrinsics_sigma of each camera, for intrinsics that were not refined
-void put_deviations(const SharedEquations& equations, const CameraImuState& state,
-                    std::span<const Vector8d> intrinsics_sigma, CameraImuFit& fit);
+/// @returns deviations of the cameras' intrinsics_change, as far as intrinsics were held
+std::vector<Vector8d> put_deviations(const SharedEquations& equations, const CameraImuState& state,
+                                     std::span<const Vector8d> intrinsics_sigma, CameraImuFit& fit);
 
-/// The verdict. @param too_fast the motion is more than the knots can follow
-void judge(const CameraImuOptions& options, bool too_fast, double length_s, CameraImuFit& fit);
+/// The verdict. @param change_sigma what put_deviations() gave
+/// @param too_fast the motion is more than the knots can follow
+void judge(const CameraImuOptions& options, std::span<const Vector8d> change_sigma, bool too_fast, double length_s,
+           CameraImuFit& fit);
 
 }  // namespace loc::calib

@@ -515,6 +515,10 @@ TEST(CameraImu, MatricesOfTheImuAndGravityAreFound) {
   const CameraImuFit wrong = calibrate(plain, {.gravity = 9.75});
   EXPECT_NEAR(wrong.gravity_size.value, 9.80665, 5 * wrong.gravity_size.sigma);
   EXPECT_LT(wrong.gravity_size.sigma, 0.02);
+  const CameraImuFit far_off = calibrate(plain, {.gravity = 8});
+  EXPECT_GE(far_off.quality.verdict, Verdict::kWarn);
+  EXPECT_NE(far_off.quality.reasons.front().find("Gravity seems to be"), std::string::npos)
+      << far_off.quality.reasons.front();
   const CameraImuFit found = calibrate(plain, {.gravity = 9.75, .estimate_gravity = true});
   EXPECT_NEAR(found.gravity_size.value, 9.80665, 4 * found.gravity_size.sigma);
   EXPECT_NEAR(found.gravity_target.norm(), found.gravity_size.value, 1e-9);
@@ -583,6 +587,14 @@ TEST(CameraImu, SamplesAndPicturesThatCannotBeUsedAreCounted) {
   EXPECT_NEAR(half.knot_spacing_s, 0.02, 0.001);
   EXPECT_NEAR(half.gyroscope_noise_scale, 1, 0.15);
   EXPECT_LT(in_sigmas(error_of(half, gap, 0), half.cameras[0]).cwiseAbs().maxCoeff(), 4);
+  // An accelerometer in g: not only "refused", but what is wrong.
+  WavedRig in_g = wave({.seconds = 12}, 2);
+  for (ImuMeasurement& m : in_g.imu) m.specific_force /= 9.80665;
+  const CameraImuFit wrong_unit = calibrate(in_g);
+  EXPECT_GE(wrong_unit.quality.verdict, Verdict::kWarn);
+  EXPECT_TRUE(std::ranges::any_of(wrong_unit.quality.reasons, [](const std::string& r) {
+    return r.find("The accelerometer fits") != std::string::npos || r.find("Gravity seems") != std::string::npos;
+  })) << wrong_unit.quality.reasons.front();
   // Readings in degrees: the camera knows better.
   for (ImuMeasurement& m : rig.imu) m.angular_velocity *= 180 / std::numbers::pi;
   expect_data_error([&] { calibrate(rig); }, {"times as fast as the camera", "deg/s"});
