@@ -35,9 +35,11 @@ using calib::ImuRow;
 using calib::SharedLayout;
 using Eigen::Vector3d;
 
-constexpr double kMargin = 0.5;   // [s] of IMU samples beyond the pictures
-constexpr double kInside = 0.02;  // [s] that pictures keep from the ends
+constexpr double kMargin = 0.5;      // [s] of IMU samples beyond the pictures
+constexpr double kLeastForce = 0.5;  // of gravity, that the mean specific force is
+constexpr double kInside = 0.02;     // [s] that pictures keep from the ends
 constexpr double kStartSmoothing = 1e-4;
+constexpr double kSmallDamping = 1e-3;  // beyond, a step is small because it was held back
 constexpr int kNoiseRounds = 2;
 constexpr double kCommonWeight = 20;        // coordinates of corners that the common noise counts for
 constexpr double kLeastCornerSigma = 0.01;  // [px]
@@ -140,6 +142,12 @@ CameraImuState first_state(const CameraImuRecording& recording, const calib::Cha
   state.biases.topRows(3).colwise() = start.gyroscope_bias;
   Vector3d force = Vector3d::Zero();
   for (const ImuRow& row : recording.imu) force += attitude.at(row.t_s) * row.accel;
+  force /= static_cast<double>(recording.imu.size());
+  const double share = force.norm() / options.gravity;
+  if (!(share > kLeastForce && share < 1 / kLeastForce)) {
+    throw DataError("the accelerometer's mean is " + to_text(force.norm(), 3) + " m/s^2, not about " +
+                    to_text(options.gravity, 3) + ": check its unit (m/s^2), its axes, and that it is there");
+  }
   state.gravity = -force.normalized() * options.gravity;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     const auto& own = recording.cameras[c].poses;
@@ -176,7 +184,7 @@ class Solver {
     fit_.converged = false;
     for (int i = 0; i < options_.max_iterations; ++i) {
       ++fit_.iterations;
-      if (!system_.solve(damping, step)) {
+      if (!system_.solve(damping, step) || !step.shared.allFinite()) {
         damping = std::max(damping, 1e-8) * growth;
         growth *= 2;
         continue;
@@ -185,11 +193,12 @@ class Solver {
       const double next_cost = problem_.cost(next).total();
       const double predicted = -0.5 * system_.slope(step) + 0.5 * damping * system_.damped_square(step);
       const double gain = (cost - next_cost) / std::max(predicted, 1e-300);
-      const bool small = std::ranges::all_of(shared_.cameras, [&](const SharedLayout::OfCamera& c) {
-        return step.shared.segment<3>(c.first + calib::kTurn).norm() < 1e-7 &&
-               step.shared.segment<3>(c.first + calib::kShift).norm() < 1e-7 &&
-               std::abs(step.shared[c.first + calib::kOffset]) < 1e-8;
-      });
+      const bool small =
+          damping <= kSmallDamping && std::ranges::all_of(shared_.cameras, [&](const SharedLayout::OfCamera& c) {
+            return step.shared.segment<3>(c.first + calib::kTurn).norm() < 1e-7 &&
+                   step.shared.segment<3>(c.first + calib::kShift).norm() < 1e-7 &&
+                   std::abs(step.shared[c.first + calib::kOffset]) < 1e-8;
+          });
       if (gain > 0 || small) {
         state = next;
         const double old = cost;
@@ -436,6 +445,11 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
   target.check();
   require(!cameras.empty(), "cameras", 0, "must be at least one");
   for (const CameraRecording& camera : cameras) camera.camera.check();
+  // What has no noise would be an equation, not a measurement.
+  require_positive("noise.gyroscope_noise_density", noise.gyroscope_noise_density);
+  require_positive("noise.accelerometer_noise_density", noise.accelerometer_noise_density);
+  require_positive("noise.gyroscope_random_walk", noise.gyroscope_random_walk);
+  require_positive("noise.accelerometer_random_walk", noise.accelerometer_random_walk);
   CameraImuFit fit;
   const double begin_cpu = cpu_s();
   CameraImuRecording recording = calib::read_recording(target, cameras, imu, options.corner_sigma_px, fit);

@@ -195,8 +195,8 @@ struct CameraImuFit {
 
 /// @param imu calibrated samples; those that are not finite or not later than the one before are skipped and counted
 /// @param noise densities of the IMU
-/// @throws std::invalid_argument for options, the target and the cameras; DataError for what cannot be calibrated, with
-/// the reason: no common motion, one axis only, too few pictures.
+/// @throws std::invalid_argument for options, the target, the cameras, and noise that is not positive; DataError for
+/// what cannot be calibrated, with the reason: no common motion, one axis only, too few pictures.
 CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<const CameraRecording> cameras,
                                   std::span<const ImuMeasurement> imu, const ImuNoise& noise,
                                   const CameraImuOptions& options = {});

@@ -18,8 +18,8 @@ using Eigen::VectorXd;
 constexpr double kLeastPivot = 1e-13;
 constexpr double kAlikePeaks = 0.9;
 constexpr double kDoubtfulNoise = 3;
-constexpr double kNoNoise = 20;         // from here on it is not noise
-constexpr double kOtherGravity = 0.01;  // as a share
+constexpr double kNoNoise = 20;          // from here on it is not noise
+constexpr double kOtherGravity = 0.003;  // as a share
 constexpr double kPulledApart = 2;
 constexpr double kByChance = 2;  // deviations
 // Deviations from which what was held is something else. What was held wrongly also pulls pieces of the recording

@@ -587,14 +587,12 @@ TEST(CameraImu, SamplesAndPicturesThatCannotBeUsedAreCounted) {
   EXPECT_NEAR(half.knot_spacing_s, 0.02, 0.001);
   EXPECT_NEAR(half.gyroscope_noise_scale, 1, 0.15);
   EXPECT_LT(in_sigmas(error_of(half, gap, 0), half.cameras[0]).cwiseAbs().maxCoeff(), 4);
-  // An accelerometer in g: not only "refused", but what is wrong.
-  WavedRig in_g = wave({.seconds = 12}, 2);
-  for (ImuMeasurement& m : in_g.imu) m.specific_force /= 9.80665;
-  const CameraImuFit wrong_unit = calibrate(in_g);
-  EXPECT_GE(wrong_unit.quality.verdict, Verdict::kWarn);
-  EXPECT_TRUE(std::ranges::any_of(wrong_unit.quality.reasons, [](const std::string& r) {
-    return r.find("The accelerometer fits") != std::string::npos || r.find("Gravity seems") != std::string::npos;
-  })) << wrong_unit.quality.reasons.front();
+  // An accelerometer in g, or that is not there.
+  for (const double factor : {1 / 9.80665, 0.0}) {
+    WavedRig other = wave({.seconds = 12}, 2);
+    for (ImuMeasurement& m : other.imu) m.specific_force *= factor;
+    expect_data_error([&] { calibrate(other); }, {"accelerometer's mean is", "unit"});
+  }
   // Readings in degrees: the camera knows better.
   for (ImuMeasurement& m : rig.imu) m.angular_velocity *= 180 / std::numbers::pi;
   expect_data_error([&] { calibrate(rig); }, {"times as fast as the camera", "deg/s"});
@@ -640,6 +638,13 @@ TEST(CameraImu, WhatCannotBeSaysWhy) {
   const WavedRig rig = wave({.seconds = 3}, 1);
   EXPECT_THROW(calibrate(rig, {.order = 2}), std::invalid_argument);
   EXPECT_THROW(calibrate(rig, {.loss_sigmas = 0}), std::invalid_argument);
+  // What is said to have no noise.
+  for (double ImuNoise::*field : {&ImuNoise::gyroscope_noise_density, &ImuNoise::accelerometer_noise_density,
+                                  &ImuNoise::gyroscope_random_walk, &ImuNoise::accelerometer_random_walk}) {
+    ImuNoise none;
+    none.*field = 0;
+    EXPECT_THROW(calibrate(wave({.seconds = 12}, 1), {}, none), std::invalid_argument);
+  }
   // Knots closer than samples are refused before any memory is asked for.
   EXPECT_THROW(calibrate(wave({.seconds = 12}, 1), {.knot_spacing_s = 0.004}), std::invalid_argument);
   // Biases that are all but constant: knots all the same, at every hundredth of the pose's.
