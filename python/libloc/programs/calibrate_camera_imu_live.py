@@ -29,7 +29,7 @@ from libloc import DataError
 from libloc.lcm_receiver import LcmReceiver
 from libloc.programs.calibrate_camera_imu_turns import CameraTurns
 from libloc.programs.calibrate_images import of_message
-from libloc.programs.calibrate_live import DEFAULT_URL
+from libloc.programs.calibrate_live import DEFAULT_URL, map_of_cells
 from libloc.programs.calibrate_plots import new_figure
 
 _MESSAGES: Any = loc  # lcm-gen writes no types
@@ -255,15 +255,6 @@ def is_small(fit: libloc.CameraImuFit) -> bool:
     return turn < _ENOUGH_DEG and shift < _ENOUGH_MM and offset < _ENOUGH_MS
 
 
-def _map_of(cells: NDArray[np.int64], encoding: str | None) -> list[str]:
-    marks = "·░▒█"
-    try:
-        marks.encode(encoding or "ascii")
-    except (UnicodeEncodeError, LookupError):
-        marks = ".-+#"
-    return ["".join(2 * marks[i] for i in row) for row in np.digitize(cells, [1, 10, 100])]
-
-
 class _Display:
     """One line a second; on a terminal the image's cells that are drawn over and over."""
 
@@ -288,7 +279,7 @@ class _Display:
             return
         lines = [
             head,
-            *(f"  {line}" for line in _map_of(collected.cells, self._stream.encoding)),
+            *(f"  {line}" for line in map_of_cells(collected.cells, (1, 10, 100), self._stream.encoding)),
             advice.text,
         ]
         up = f"\x1b[{self._height}A" if self._height else ""

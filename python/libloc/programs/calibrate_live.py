@@ -131,15 +131,21 @@ class Collection:
         return out
 
 
-def coverage_map(coverage: NDArray[np.int32], encoding: str | None) -> list[str]:
-    """The sphere of directions as ten lines of text: up is +z, to the right the azimuth from x towards y."""
+def map_of_cells(
+    cells: NDArray[np.integer[Any]], steps: tuple[int, int, int], encoding: str | None
+) -> list[str]:
+    """Counts as lines of text, darker from each of the steps on; two marks a cell."""
     marks = "·░▒█"
     try:
         marks.encode(encoding or "ascii")
     except (UnicodeEncodeError, LookupError):
         marks = ".-+#"
-    step = np.digitize(coverage, [1, 5, 20])
-    return ["".join(2 * marks[i] for i in row) for row in step[::-1]]
+    return ["".join(2 * marks[i] for i in row) for row in np.digitize(cells, steps)]
+
+
+def coverage_map(coverage: NDArray[np.int32], encoding: str | None) -> list[str]:
+    """The sphere of directions as ten lines of text: up is +z, to the right the azimuth from x towards y."""
+    return map_of_cells(coverage[::-1], (1, 5, 20), encoding)
 
 
 class Progress:
