@@ -10,12 +10,12 @@
 #include <utility>
 
 #include "libloc/calib/camera_bundle.hpp"
+#include "libloc/calib/camera_imu_first_state.hpp"
 #include "libloc/calib/camera_imu_judge.hpp"
 #include "libloc/calib/camera_imu_knots.hpp"
 #include "libloc/calib/camera_imu_problem.hpp"
 #include "libloc/calib/camera_imu_start.hpp"
 #include "libloc/calib/camera_imu_views.hpp"
-#include "libloc/calib/euler_trajectory.hpp"
 #include "libloc/calib/least_squares.hpp"
 #include "libloc/core/check.hpp"
 #include "libloc/core/statistics.hpp"
@@ -35,18 +35,15 @@ using calib::ImuRow;
 using calib::SharedLayout;
 using Eigen::Vector3d;
 
-constexpr double kMargin = 0.5;      // [s] of IMU samples beyond the pictures
-constexpr double kLeastForce = 0.5;  // of gravity, that the mean specific force is
-constexpr double kInside = 0.02;     // [s] that pictures keep from the ends
-constexpr double kStartSmoothing = 1e-4;
+constexpr double kMargin = 0.5;         // [s] of IMU samples beyond the pictures
+constexpr double kInside = 0.02;        // [s] that pictures keep from the ends
 constexpr double kSmallDamping = 1e-3;  // beyond, a step is small because it was held back
 constexpr int kNoiseRounds = 2;
 constexpr double kCommonWeight = 20;        // coordinates of corners that the common noise counts for
 constexpr double kLeastCornerSigma = 0.01;  // [px]
-constexpr double kWidestPitch = 80 * std::numbers::pi / 180;
-constexpr double kLineBand = 8;      // [px] rows that are taken to be read at one time
-constexpr int kCheckBands = 6;       // of an image, where the line delay is only looked at
-constexpr int kWindowsPerGroup = 3;  // of those that pull together
+constexpr double kLineBand = 8;             // [px] rows that are taken to be read at one time
+constexpr int kCheckBands = 6;              // of an image, where the line delay is only looked at
+constexpr int kWindowsPerGroup = 3;         // of those that pull together
 constexpr int kLeastGroups = 8;
 constexpr int kMostGroups = 24;
 // Deviations of intrinsics that come without any: what two calibrations of one camera usually differ by.
@@ -58,122 +55,20 @@ double cpu_s() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-// Attitude of the IMU in target at any time: from each picture to the next by the gyroscope, what is left over spread
-// evenly.
-class RoughAttitude {
- public:
-  RoughAttitude(const calib::MeanRate& gyro, const CameraImuStart& start, std::span<const CameraPoseSample> poses)
-      : gyro_(gyro), bias_(start.gyroscope_bias) {
-    for (const CameraPoseSample& pose : poses) {
-      times_.push_back(pose.t_s + start.time_offset_s);
-      rotations_.push_back(pose.T_target_camera.rotation * start.R_camera_imu);
-    }
-  }
-  const std::vector<double>& times() const { return times_; }
-  const std::vector<Eigen::Quaterniond>& rotations() const { return rotations_; }
-
-  Eigen::Quaterniond at(double t) const {
-    const auto next = static_cast<std::size_t>(std::upper_bound(times_.begin(), times_.end(), t) - times_.begin());
-    if (next == 0) return turned(0, t);
-    if (next == times_.size()) return turned(next - 1, t);
-    const double share = (t - times_[next - 1]) / (times_[next] - times_[next - 1]);
-    const Vector3d left = so3::boxminus(rotations_[next], turned(next - 1, times_[next]));
-    return so3::boxplus(turned(next - 1, t), share * left);
-  }
-
- private:
-  Eigen::Quaterniond turned(std::size_t from, double t) const {
-    return rotations_[from] * calib::turn_between(gyro_, bias_, times_[from], t);
-  }
-  const calib::MeanRate& gyro_;
-  Vector3d bias_;
-  std::vector<double> times_;
-  std::vector<Eigen::Quaterniond> rotations_;
-};
-
-// Three angles that go on from sample to sample. @throws DataError where the second is too wide.
-Eigen::MatrixXd continuous_angles(const Eigen::Quaterniond& mean, std::span<const Pose3> poses) {
-  Eigen::MatrixXd out(3, static_cast<Eigen::Index>(poses.size()));
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const auto column = static_cast<Eigen::Index>(i);
-    Vector3d phi = angles_of(mean.conjugate() * poses[i].rotation);
-    if (std::abs(phi.y()) > kWidestPitch) {
-      throw DataError("the rig turned by " + to_text(std::abs(phi.y()) * 180 / std::numbers::pi, 3) +
-                      " deg from its mean attitude: too wide a motion for three angles, take the cumulative form");
-    }
-    for (const int axis : {0, 2}) {
-      if (i > 0) {
-        const double turns = (out(axis, column - 1) - phi[axis]) / (2 * std::numbers::pi);
-        phi[axis] += 2 * std::numbers::pi * std::round(turns);
-      }
-    }
-    out.col(column) = phi;
-  }
-  return out;
-}
-
-CameraImuState first_state(const CameraImuRecording& recording, const calib::ChainPlan& plan,
-                           std::span<const CameraRecording> cameras, CameraImuFit& fit,
-                           const CameraImuOptions& options) {
-  const CameraImuStart& start = fit.cameras.front().start;
-  const auto& poses = recording.cameras.front().poses;
-  CameraImuState state;
-  state.form = options.rotation;
-  const calib::MeanRate gyro(recording.imu);
-  const RoughAttitude attitude(gyro, start, poses);
-  std::vector<double> times;
-  std::vector<Pose3> samples;
-  for (int i = 0; i <= 2 * plan.grid.segments; ++i) {  // two in a segment
-    times.push_back(plan.grid.start_s + i * plan.grid.spacing_s / 2);
-    samples.push_back({attitude.at(times.back()), Vector3d::Zero()});
-  }
-  if (state.form == RotationForm::kThreeAngles) {
-    state.mean = mean_rotation(attitude.rotations());
-    state.angles = calib::fit_vectors(plan.grid, times, continuous_angles(state.mean, samples), kStartSmoothing);
-  } else {
-    state.rotations = calib::fit_rotations(plan.grid, times, samples, kStartSmoothing);
-  }
-  Eigen::MatrixXd positions(3, static_cast<Eigen::Index>(poses.size()));
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    positions.col(static_cast<Eigen::Index>(i)) = poses[i].T_target_camera.translation;
-  }
-  state.positions = calib::fit_vectors(plan.grid, attitude.times(), positions, kStartSmoothing);
-  state.biases = Eigen::MatrixXd::Zero(6, plan.bias_knots());
-  state.biases.topRows(3).colwise() = start.gyroscope_bias;
-  Vector3d force = Vector3d::Zero();
-  for (const ImuRow& row : recording.imu) force += attitude.at(row.t_s) * row.accel;
-  force /= static_cast<double>(recording.imu.size());
-  const double share = force.norm() / options.gravity;
-  if (!(share > kLeastForce && share < 1 / kLeastForce)) {
-    throw DataError("the accelerometer's mean is " + to_text(force.norm(), 3) + " m/s^2, not about " +
-                    to_text(options.gravity, 3) + ": check its unit (m/s^2), its axes, and that it is there");
-  }
-  state.gravity = -force.normalized() * options.gravity;
-  for (std::size_t c = 0; c < cameras.size(); ++c) {
-    const auto& own = recording.cameras[c].poses;
-    calib::CameraState camera;
-    camera.R_camera_imu = fit.cameras[c].start.R_camera_imu;
-    camera.offset_s = fit.cameras[c].start.time_offset_s;
-    camera.middle_s = (own.front().t_s + own.back().t_s) / 2;
-    camera.camera = cameras[c].camera;
-    if (c > 0) {
-      // The first camera stands where the IMU is; the others where they saw themselves from there.
-      const VectorSpline position(plan.grid, state.positions);
-      for (const CameraPoseSample& pose : own) {
-        const Vector3d imu = position.value(pose.t_s + camera.offset_s);
-        camera.t_camera_imu += pose.T_target_camera.inverse() * imu / static_cast<double>(own.size());
-      }
-    }
-    state.cameras.push_back(std::move(camera));
-  }
-  return state;
-}
+using Clock = std::chrono::steady_clock;
 
 class Solver {
  public:
+  /// @param origin_offset_s of the first camera: what is to be added to its offset @param begin of all the work
   Solver(const CameraImuProblem& problem, const SharedLayout& shared, const CameraImuOptions& options,
-         CameraImuFit& fit)
-      : problem_(problem), shared_(shared), options_(options), fit_(fit), system_(problem.layout(shared)) {}
+         double origin_offset_s, Clock::time_point begin, CameraImuFit& fit)
+      : problem_(problem),
+        shared_(shared),
+        options_(options),
+        origin_offset_s_(origin_offset_s),
+        begin_(begin),
+        fit_(fit),
+        system_(problem.layout(shared)) {}
 
   /// Levenberg and Marquardt; damping by the gain ratio after Nielsen 1999. @returns the cost.
   double run(CameraImuState& state) {
@@ -182,57 +77,63 @@ class Solver {
     double cost = problem_.linearise(state, shared_, system_).total();
     ChainStep step;
     fit_.converged = false;
-    for (int i = 0; i < options_.max_iterations; ++i) {
+    while (!fit_.converged && fit_.stopped.empty()) {
+      if (fit_.iterations == options_.max_iterations) {
+        fit_.stopped = std::to_string(options_.max_iterations) + " iterations";
+        break;
+      }
       ++fit_.iterations;
-      if (!system_.solve(damping, step) || !step.shared.allFinite()) {
+      const bool solved = system_.solve(damping, step) && step.shared.allFinite();
+      if (!solved || !taken(state, step, damping, cost)) {
         damping = std::max(damping, 1e-8) * growth;
         growth *= 2;
-        continue;
-      }
-      const CameraImuState next = problem_.stepped(state, shared_, step);
-      const double next_cost = problem_.cost(next).total();
-      const double predicted = -0.5 * system_.slope(step) + 0.5 * damping * system_.damped_square(step);
-      const double gain = (cost - next_cost) / std::max(predicted, 1e-300);
-      const bool small =
-          damping <= kSmallDamping && std::ranges::all_of(shared_.cameras, [&](const SharedLayout::OfCamera& c) {
-            return step.shared.segment<3>(c.first + calib::kTurn).norm() < 1e-7 &&
-                   step.shared.segment<3>(c.first + calib::kShift).norm() < 1e-7 &&
-                   std::abs(step.shared[c.first + calib::kOffset]) < 1e-8;
-          });
-      if (gain > 0 || small) {
-        state = next;
-        const double old = cost;
-        cost = problem_.linearise(state, shared_, system_).total();
-        damping = std::max(damping * std::max(0.1, 1 - std::pow(2 * gain - 1, 3)), 1e-12);
-        growth = 2;
-        if (small && std::abs(old - cost) < 1e-6 * cost) {
-          fit_.converged = true;
-          break;
-        }
       } else {
-        damping *= growth;
-        growth *= 2;
+        growth = 2;
       }
-      const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-      if (options_.progress && !options_.progress({fit_.iterations, cost, state.cameras.front().offset_s, elapsed})) {
-        fit_.stopped = "interrupted";
-        break;
-      }
-      if (options_.time_limit_s > 0 && elapsed > options_.time_limit_s) {
-        fit_.stopped = "time limit";
-        break;
-      }
+      look_up(cost, state);
     }
     return cost;
   }
 
  private:
+  // The step, when it does not raise the cost; then damping, cost and converged are those behind it.
+  bool taken(CameraImuState& state, const ChainStep& step, double& damping, double& cost) {
+    const CameraImuState next = problem_.stepped(state, shared_, step);
+    const double next_cost = problem_.cost(next).total();
+    const double predicted = -0.5 * system_.slope(step) + 0.5 * damping * system_.damped_square(step);
+    const double gain = (cost - next_cost) / std::max(predicted, 1e-300);
+    const bool small =
+        damping <= kSmallDamping && std::ranges::all_of(shared_.cameras, [&](const SharedLayout::OfCamera& c) {
+          return step.shared.segment<3>(c.first + calib::kTurn).norm() < 1e-7 &&
+                 step.shared.segment<3>(c.first + calib::kShift).norm() < 1e-7 &&
+                 std::abs(step.shared[c.first + calib::kOffset]) < 1e-8;
+        });
+    if (!(gain > 0) && !small) return false;
+    state = next;
+    const double old = std::exchange(cost, problem_.linearise(state, shared_, system_).total());
+    damping = std::max(damping * std::max(0.1, 1 - std::pow(2 * gain - 1, 3)), 1e-12);
+    fit_.converged = small && std::abs(old - cost) < 1e-6 * cost;
+    return true;
+  }
+
+  void look_up(double cost, const CameraImuState& state) {
+    if (fit_.converged) return;
+    const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
+    const double offset = state.cameras.front().offset_s + origin_offset_s_;
+    if (options_.progress && !options_.progress({fit_.iterations, cost, offset, elapsed})) {
+      fit_.stopped = "interrupted";
+    } else if (options_.time_limit_s > 0 && elapsed > options_.time_limit_s) {
+      fit_.stopped = "time limit";
+    }
+  }
+
   const CameraImuProblem& problem_;
   const SharedLayout& shared_;
   const CameraImuOptions& options_;
+  double origin_offset_s_;
+  Clock::time_point begin_;
   CameraImuFit& fit_;
   ChainSystem system_;
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
 // Noise of the IMU's sensors and of each picture, as their residuals have it. The spline takes one in (spacing / dt) of
@@ -282,51 +183,19 @@ void adapt_noise(CameraImuProblem& problem, const CameraImuState& state, double 
   }
 }
 
-// What both have seen, and a little more of the IMU.
-void keep_common(CameraImuRecording& recording, CameraImuFit& fit) {
-  double begin = recording.imu.back().t_s;
-  double end = recording.imu.front().t_s;
-  for (std::size_t c = 0; c < fit.cameras.size(); ++c) {
-    const double d = fit.cameras[c].start.time_offset_s;
-    begin = std::min(begin, recording.cameras[c].frames.front().t_s + d - kMargin);
-    end = std::max(end, recording.cameras[c].frames.back().t_s + d + kMargin);
-  }
-  begin = std::max(begin, recording.imu.front().t_s);
-  end = std::min(end, recording.imu.back().t_s);
-  const auto before = recording.imu.size();
-  std::erase_if(recording.imu, [&](const ImuRow& row) { return row.t_s < begin || row.t_s > end; });
-  fit.counts.push_back({"imu.skipped.no_pictures", static_cast<std::int64_t>(before - recording.imu.size())});
-  fit.counts.push_back({"imu.used", static_cast<std::int64_t>(recording.imu.size())});
-  for (std::size_t c = 0; c < fit.cameras.size(); ++c) {
-    CameraImuRecording::OfCamera& camera = recording.cameras[c];
-    CameraImuRecording::OfCamera kept;
-    for (std::size_t i = 0; i < camera.frames.size(); ++i) {
-      const double t = camera.frames[i].t_s + fit.cameras[c].start.time_offset_s;
-      if (t < begin + kInside || t > end - kInside) {
-        fit.cameras[c].views[camera.frames[i].view].reason = "no IMU samples at its time";
-        continue;
-      }
-      kept.frames.push_back(std::move(camera.frames[i]));
-      kept.poses.push_back(camera.poses[i]);
-    }
-    camera = std::move(kept);
-    if (camera.frames.empty()) {
-      throw DataError(fit.cameras[c].camera.name + ": no picture with the target has IMU samples at its time");
-    }
-  }
-}
-
 void find_starts(const CalibrationTarget& target, const CameraImuOptions& options, CameraImuRecording& recording,
                  std::span<const CameraRecording> cameras, CameraImuFit& fit) {
-  const calib::MeanRate gyro(recording.imu);
   for (std::size_t c = 0; c < cameras.size(); ++c) {
-    calib::unify_numbers(target, gyro, nullptr, recording.cameras[c]);
-    auto found = calib::find_start(recording.cameras[c].poses, recording.imu, options.time_offset_s);
+    calib::unify_numbers(target, nullptr, nullptr, recording.cameras[c]);
+    std::optional<double> given = options.time_offset_s;
+    if (given) *given -= recording.cameras[c].origin_offset_s;
+    auto found = calib::find_start(recording.cameras[c].poses, recording.imu, given);
     if (!found.start) {
       throw DataError((cameras.size() > 1 ? cameras[c].camera.name + ": " : std::string()) + found.failure);
     }
     fit.cameras[c].start = std::move(*found.start);
-    calib::unify_numbers(target, gyro, &fit.cameras[c].start, recording.cameras[c]);
+    const calib::GyroTurns gyro(recording.imu, fit.cameras[c].start.gyroscope_bias);
+    calib::unify_numbers(target, &gyro, &fit.cameras[c].start, recording.cameras[c]);
   }
 }
 
@@ -360,8 +229,9 @@ calib::SharedEquations equations_of(const CameraImuProblem& problem, const Camer
   out.all = calib::shared_layout(state.cameras, all);
   CameraImuProblem wide = problem;
   if (options.check_line_delay && !choice.line_delay) {
-    const double height = state.cameras.front().camera.height_px;
-    wide.frames() = calib::split_rows(problem.frames(), height / kCheckBands, height / 2);
+    std::vector<double> heights;
+    for (const calib::CameraState& camera : state.cameras) heights.push_back(camera.camera.height_px);
+    wide.frames() = calib::split_rows(problem.frames(), heights, kCheckBands);
   }
   ChainSystem system(wide.layout(out.all));
   wide.linearise(state, out.all, system);
@@ -375,23 +245,22 @@ calib::SharedEquations equations_of(const CameraImuProblem& problem, const Camer
   return out;
 }
 
-void put_residuals(const CameraImuProblem& problem, const CameraImuState& state, TimeNs origin,
-                   std::span<const CameraRecording> cameras, double loss, CameraImuFit& fit) {
+void put_residuals(const CameraImuProblem& problem, const CameraImuState& state, const CameraImuRecording& recording,
+                   double loss, CameraImuFit& fit) {
   fit.imu_residuals = problem.imu_residuals(state);
   const auto n = static_cast<double>(3 * fit.imu_residuals.cols());
   fit.gyroscope_chi = std::sqrt(fit.imu_residuals.topRows(3).squaredNorm() / n);
   fit.accelerometer_chi = std::sqrt(fit.imu_residuals.bottomRows(3).squaredNorm() / n);
   for (const ImuRow& row : problem.imu()) {
-    fit.imu_time_ns.push_back(origin + from_seconds(row.t_s));
+    fit.imu_time_ns.push_back(recording.time_of(row.t_s));
     fit.T_target_imu.push_back(problem.pose_at(state, row.t_s));
   }
   fit.biases = state.biases;
   for (int i = 0; i < problem.plan().bias_knots(); ++i) {
-    fit.bias_time_ns.push_back(origin +
-                               from_seconds(problem.plan().grid.start_s + i * problem.plan().bias_spacing_s()));
+    fit.bias_time_ns.push_back(recording.time_of(problem.plan().bias_time_s(i)));
   }
-  std::vector<double> chi_sum(cameras.size(), 0.0);
-  std::vector<double> chi_count(cameras.size(), 0.0);
+  std::vector<double> chi_sum(fit.cameras.size(), 0.0);
+  std::vector<double> chi_count(fit.cameras.size(), 0.0);
   const auto corners = problem.corner_residuals(state);
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const FrameRow& frame = problem.frames()[i];
@@ -404,11 +273,11 @@ void put_residuals(const CameraImuProblem& problem, const CameraImuState& state,
       camera.corners.push_back({static_cast<std::int32_t>(frame.view), frame.corners[k].id, frame.corners[k].pixel,
                                 residual, std::isfinite(s) ? 1 / (1 + s / (loss * loss)) : 0});
       if (!std::isfinite(s)) continue;
-      chi_sum[frame.camera] += s;
+      chi_sum[frame.camera] += loss * loss * std::log1p(s / (loss * loss));
       chi_count[frame.camera] += 2;
     }
   }
-  for (std::size_t c = 0; c < cameras.size(); ++c) {
+  for (std::size_t c = 0; c < fit.cameras.size(); ++c) {
     CameraImuCamera& camera = fit.cameras[c];
     camera.corner_chi = std::sqrt(chi_sum[c] / std::max(1.0, chi_count[c]));
     std::vector<double> squares(camera.views.size(), 0.0);
@@ -452,10 +321,11 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
   require_positive("noise.accelerometer_random_walk", noise.accelerometer_random_walk);
   CameraImuFit fit;
   const double begin_cpu = cpu_s();
+  const Clock::time_point begin_time = Clock::now();
   CameraImuRecording recording = calib::read_recording(target, cameras, imu, options.corner_sigma_px, fit);
   for (std::size_t c = 0; c < cameras.size(); ++c) fit.cameras[c].camera = cameras[c].camera;
   find_starts(target, options, recording, cameras, fit);
-  keep_common(recording, fit);
+  calib::keep_common(recording, fit);
   const double begin = recording.imu.front().t_s;
   const double end = recording.imu.back().t_s;
   const double dt = calib::sample_period(recording.imu);
@@ -469,14 +339,22 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
   fit.bandwidth_hz = knots.bandwidth_hz;
   const DiscreteImuNoise sample = discretise(noise, dt);
   const DiscreteImuNoise knot = discretise(noise, plan.bias_spacing_s());
-  CameraImuState state = first_state(recording, plan, cameras, fit, options);
+  std::vector<CameraImuStart> starts;
+  for (const CameraImuCamera& camera : fit.cameras) starts.push_back(camera.start);
+  const calib::GyroTurns gyro(recording.imu, starts.front().gyroscope_bias);
+  const calib::RoughTrack track = calib::rough_track(target, starts, gyro, recording);
+  CameraImuState state =
+      calib::first_state(recording, track, gyro, plan, cameras, starts, options.rotation, options.gravity);
   std::vector<FrameRow> frames;
   std::vector<Vector8d> intrinsics_sigma;
   std::vector<calib::IntrinsicsPrior> priors;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     const CameraCalibration& camera = cameras[c].camera;
     std::vector<FrameRow> own = std::move(recording.cameras[c].frames);
-    if (options.estimate_line_delay) own = calib::split_rows(own, kLineBand, 0.5 * camera.height_px);
+    if (options.estimate_line_delay) {
+      const std::vector<double> heights(cameras.size(), camera.height_px);
+      own = calib::split_rows(own, heights, static_cast<int>(std::ceil(camera.height_px / kLineBand)));
+    }
     frames.insert(frames.end(), std::make_move_iterator(own.begin()), std::make_move_iterator(own.end()));
     intrinsics_sigma.push_back(sigma_of_intrinsics(camera));
     // Where nobody measured them, what they are taken to be is no measurement either.
@@ -490,6 +368,11 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
                             knot.sigma_accelerometer_bias_step},
                            options.loss_sigmas, plan);
   if (options.refine_intrinsics) problem.priors() = std::move(priors);
+  for (int i = 0; i + 1 < plan.bias_knots(); ++i) {
+    // Where a gap was closed, biases had longer to walk.
+    const TimeNs between = recording.time_of(plan.bias_time_s(i + 1)) - recording.time_of(plan.bias_time_s(i));
+    problem.bias_growth().push_back(std::sqrt(to_seconds(between) / plan.bias_spacing_s()));
+  }
   fit.start_cpu_s = cpu_s() - begin_cpu;
 
   const double solve_begin = cpu_s();
@@ -497,7 +380,7 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
                                    options.estimate_gravity, options.estimate_imu_matrices};
   const SharedLayout shared = calib::shared_layout(state.cameras, choice);
   {  // its matrices are large, and others of that size follow
-    Solver solver(problem, shared, options, fit);
+    Solver solver(problem, shared, options, recording.cameras.front().origin_offset_s, begin_time, fit);
     fit.cost = solver.run(state);
     for (int round = 0; options.adapt_noise && round < kNoiseRounds && fit.stopped.empty(); ++round) {
       adapt_noise(problem, state, dt, fit);
@@ -508,10 +391,12 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
     const calib::CameraState& found = state.cameras[c];
     CameraImuCamera& camera = fit.cameras[c];
     camera.T_camera_imu = {found.R_camera_imu, found.t_camera_imu};
-    camera.time_offset_s = found.offset_s;
+    camera.time_offset_s = found.offset_s + recording.cameras[c].origin_offset_s;
     camera.camera = found.camera;
     camera.camera.T_body_camera = camera.T_camera_imu.inverse();
-    camera.camera.time_offset_s = found.offset_s;
+    camera.camera.time_offset_s = camera.time_offset_s;
+    camera.start.time_offset_s += recording.cameras[c].origin_offset_s;
+    for (double& offset : camera.start.curve.offset_s) offset += recording.cameras[c].origin_offset_s;
     if (options.refine_intrinsics) {
       camera.intrinsics_change = calib::parameters_of(found.camera) - calib::parameters_of(cameras[c].camera);
     }
@@ -521,8 +406,9 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
   fit.accelerometer_matrix = state.accel_matrix;
   const std::vector<Vector8d> change_sigma =
       calib::put_deviations(equations_of(problem, state, choice, options), state, intrinsics_sigma, fit);
-  put_residuals(problem, state, recording.origin, cameras, options.loss_sigmas, fit);
-  calib::judge(options, change_sigma, knots.too_fast, end - begin, fit);
+  put_residuals(problem, state, recording, options.loss_sigmas, fit);
+  const double length = to_seconds(recording.time_of(end) - recording.time_of(begin));
+  calib::judge(options, change_sigma, knots.too_fast, length, fit);
   fit.solve_cpu_s = cpu_s() - solve_begin;
   return fit;
 }

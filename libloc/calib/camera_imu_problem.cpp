@@ -58,17 +58,19 @@ Eigen::Matrix<double, 3, 2> across(const Vector3d& gravity) {
   return out;
 }
 
-std::vector<FrameRow> split_rows(const std::vector<FrameRow>& frames, double band_px, double middle_px) {
+std::vector<FrameRow> split_rows(const std::vector<FrameRow>& frames, std::span<const double> heights_px, int bands) {
   std::vector<FrameRow> out;
   for (const FrameRow& frame : frames) {
-    std::map<int, std::vector<FrameCorner>> bands;
+    const double height = heights_px[frame.camera];
+    std::map<int, std::vector<FrameCorner>> rows;
     for (const FrameCorner& corner : frame.corners) {
-      bands[static_cast<int>(std::floor(corner.pixel.y() / band_px))].push_back(corner);
+      rows[static_cast<int>(std::floor(corner.pixel.y() * bands / height))].push_back(corner);
     }
-    for (auto& [band, corners] : bands) {
+    for (auto& [band, corners] : rows) {
       double sum = 0;
-      for (const FrameCorner& corner : corners) sum += corner.pixel.y() - middle_px;
-      FrameRow row{frame.camera, frame.view, frame.t_s, sum / static_cast<double>(corners.size()), frame.sigma_px, {}};
+      for (const FrameCorner& corner : corners) sum += corner.pixel.y() - height / 2;
+      FrameRow row = frame;
+      row.lines = sum / static_cast<double>(corners.size());
       row.corners = std::move(corners);
       out.push_back(std::move(row));
     }
@@ -396,7 +398,7 @@ void CameraImuProblem::add_frame(const CameraImuState& state, const FrameRow& fr
   by_time << r.angular_velocity, -to_camera * velocity;
   M.block<6, 1>(0, poses + kOffset) = by_time;
   if (places.drift >= 0) {
-    M.block<6, 1>(0, poses + places.drift - places.first) = by_time * (frame.t_s - camera.middle_s);
+    M.block<6, 1>(0, poses + places.drift - places.first) = by_time * frame.drift_s;
   }
   if (places.line_delay >= 0) {
     M.block<6, 1>(0, poses + places.line_delay - places.first) = by_time * frame.lines;
@@ -464,9 +466,10 @@ void CameraImuProblem::add_smoothing(const CameraImuState& state, int segment, S
 }
 
 void CameraImuProblem::add_biases(const CameraImuState& state, ChainSystem* system, CameraImuCost& cost) const {
-  Vector6d sigma;
-  sigma << Vector3d::Constant(sigmas_.gyro_bias_step), Vector3d::Constant(sigmas_.accel_bias_step);
+  Vector6d usual;
+  usual << Vector3d::Constant(sigmas_.gyro_bias_step), Vector3d::Constant(sigmas_.accel_bias_step);
   for (int knot = 0; knot + 1 < plan_.bias_knots(); ++knot) {
+    const Vector6d sigma = usual * (bias_growth_.empty() ? 1 : bias_growth_[static_cast<std::size_t>(knot)]);
     const Vector6d step = (state.biases.col(knot + 1) - state.biases.col(knot)).cwiseQuotient(sigma);
     cost.bias += 0.5 * step.squaredNorm();
     if (system == nullptr) continue;

@@ -18,7 +18,8 @@ namespace loc::calib {
 struct FrameCorner {
   Eigen::Vector3d point;  // in target
   Eigen::Vector2d pixel;
-  std::int32_t id = 0;
+  std::int32_t id = 0;      // as it was given
+  std::int32_t number = 0;  // on the target: another one when the picture's numbers began at another end
 };
 /// A picture, or a band of its rows when the rows have times of their own.
 struct FrameRow {
@@ -26,11 +27,12 @@ struct FrameRow {
   std::size_t view = 0;  // of the camera's recording
   double t_s = 0;        // of the camera's clock, on the common origin
   double lines = 0;      // rows from the middle of the image to that of the band
+  double drift_s = 0;    // time of the camera since the middle of its recording, where a drift adds nothing
   double sigma_px = 0;
   std::vector<FrameCorner> corners;
 };
-/// Each picture as bands of so many rows, with the mean row of the corners as theirs.
-std::vector<FrameRow> split_rows(const std::vector<FrameRow>& frames, double band_px, double middle_px);
+/// Each picture as so many bands, with the mean row of the corners as theirs. @param heights_px of the cameras' images
+std::vector<FrameRow> split_rows(const std::vector<FrameRow>& frames, std::span<const double> heights_px, int bands);
 
 /// Deviations of one reading each, and of a bias's step from one knot to the next.
 struct CameraImuSigmas {
@@ -49,6 +51,7 @@ struct ChainPlan {
 
   double bias_spacing_s() const { return grid.spacing_s * segments_per_window / biases_per_window; }
   int bias_knots() const { return windows * biases_per_window + 1; }
+  double bias_time_s(int knot) const { return grid.start_s + knot * bias_spacing_s(); }
 };
 /// A grid whose end is the end of its last window: the spacing is what comes next to the one that was asked for. Biases
 /// get knots at least every hundred segments.
@@ -58,8 +61,7 @@ struct CameraState {
   Eigen::Quaterniond R_camera_imu = Eigen::Quaterniond::Identity();
   Eigen::Vector3d t_camera_imu = Eigen::Vector3d::Zero();
   double offset_s = 0;
-  double drift = 0;     // of the offset [s/s]
-  double middle_s = 0;  // time of the camera at which the drift adds nothing
+  double drift = 0;  // of the offset [s/s]
   double line_delay_s = 0;
   CameraCalibration camera;  // its intrinsics
 };
@@ -78,7 +80,7 @@ struct CameraImuState {
 
   double time_of(const FrameRow& frame) const {
     const CameraState& c = cameras[frame.camera];
-    return frame.t_s + c.offset_s + c.drift * (frame.t_s - c.middle_s) + c.line_delay_s * frame.lines;
+    return frame.t_s + c.offset_s + c.drift * frame.drift_s + c.line_delay_s * frame.lines;
   }
 };
 
@@ -147,6 +149,8 @@ class CameraImuProblem {
   CameraImuSigmas& sigmas() { return sigmas_; }
   /// Of each camera; none: no prior.
   std::vector<IntrinsicsPrior>& priors() { return priors_; }
+  /// Factor on the deviation of each of the biases' steps; none: 1.
+  std::vector<double>& bias_growth() { return bias_growth_; }
   ChainLayout layout(const SharedLayout& shared) const;
 
   CameraImuCost cost(const CameraImuState& state) const { return evaluate(state, nullptr, nullptr); }
@@ -188,6 +192,7 @@ class CameraImuProblem {
   double loss_;
   ChainPlan plan_;
   std::vector<IntrinsicsPrior> priors_;
+  std::vector<double> bias_growth_;
   std::vector<std::size_t> first_imu_;  // of each segment; one more
   std::vector<SplineWeights> imu_weights_;
   std::vector<SplineWeights> imu_cumulative_;

@@ -33,8 +33,9 @@ constexpr double kLeastOverlap = 0.5;     // of the pictures, or of what the sho
 constexpr std::size_t kLeastSteps = 20;
 constexpr double kLeastExcitation = 0.02;  // [rad/s] along the second axis
 constexpr double kOtherUnit = 3;           // ratio of the turn rates that no mounting and no scale explains
+constexpr double kAroundGiven = 0.5;       // [s] of an offset that is known
 constexpr int kRobustRounds = 3;
-constexpr double kTurnStep = 0.01;  // [s] in which the mean rate is enough
+constexpr double kMostProducts = 1e9;  // of a correlation: seconds; beyond, not every turn is needed
 
 // A turn of the camera between two pictures.
 struct Turn {
@@ -122,13 +123,16 @@ OffsetCurve correlate(const std::vector<Turn>& turns, const MeanRate& gyro, doub
   }
   const double seen = turns.back().to_s - turns.front().from_s;
   const double possible = std::min(1.0, (gyro.end_s() - gyro.begin_s()) / seen);
-  const double needed = std::max<double>(kLeastSteps, kLeastOverlap * possible * static_cast<double>(turns.size()));
   OffsetCurve out;
   const auto offsets = static_cast<std::int64_t>((high_s - low_s) / h);
+  const double products = static_cast<double>(offsets) * static_cast<double>(turns.size());
+  const auto stride = static_cast<std::size_t>(std::max(1.0, std::ceil(products / kMostProducts)));
+  const double needed = std::max<double>(
+      kLeastSteps, kLeastOverlap * possible * static_cast<double>(turns.size()) / static_cast<double>(stride));
   for (std::int64_t k = 0; k <= offsets; ++k) {
     const double d = low_s + static_cast<double>(k) * h;
     PairSums sums;
-    for (std::size_t i = 0; i < turns.size(); ++i) {
+    for (std::size_t i = 0; i < turns.size(); i += stride) {
       const double at = (middles[i] + d - first) / h;
       if (at < -0.5 || at >= static_cast<double>(norms.size()) - 0.5) continue;
       sums.add(speeds[i], norms[static_cast<std::size_t>(std::lround(std::max(at, 0.0)))]);
@@ -256,32 +260,48 @@ Vector3d MeanRate::between(double from_s, double to_s) const {
   return (integral(to_s) - integral(from_s)) / (to_s - from_s);
 }
 
-Eigen::Quaterniond turn_between(const MeanRate& gyro, const Vector3d& bias, double from_s, double to_s) {
-  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
-  const int steps = static_cast<int>(std::ceil(std::abs(to_s - from_s) / kTurnStep));
-  const double h = steps > 0 ? (to_s - from_s) / steps : 0;
-  for (int s = 0; s < steps; ++s) {
-    const double a = from_s + s * h;
-    const Vector3d rate = h > 0 ? gyro.between(a, a + h) : gyro.between(a + h, a);
-    turn = so3::boxplus(turn, (rate - bias) * h);
+GyroTurns::GyroTurns(std::span<const ImuRow> imu, const Vector3d& bias)
+    : rate_(imu), bias_(bias), turns_{Eigen::Quaterniond::Identity()} {
+  const std::vector<double>& times = rate_.times_s();
+  for (std::size_t i = 1; i < times.size(); ++i) {
+    const double dt = times[i] - times[i - 1];
+    turns_.push_back(so3::boxplus(turns_.back(), (rate_.between(times[i - 1], times[i]) - bias_) * dt));
   }
-  return turn;
+}
+
+Eigen::Quaterniond GyroTurns::since_begin(double t_s) const {
+  const std::vector<double>& times = rate_.times_s();
+  const auto next = static_cast<std::size_t>(std::ranges::upper_bound(times, t_s) - times.begin());
+  const std::size_t at = next == 0 ? 0 : next - 1;
+  const double dt = t_s - times[at];
+  if (dt == 0) return turns_[at];
+  return so3::boxplus(turns_[at], (rate_.between(times[at], t_s) - bias_) * dt);
+}
+
+Eigen::Quaterniond GyroTurns::between(double from_s, double to_s) const {
+  return since_begin(from_s).conjugate() * since_begin(to_s);
 }
 
 StartResult find_start(std::span<const CameraPoseSample> poses, std::span<const ImuRow> imu,
                        std::optional<double> given_offset_s) {
   const std::vector<Turn> turns = turns_of(poses);
   if (turns.size() < kLeastSteps) {
+    std::vector<double> steps;
+    for (std::size_t i = 1; i < poses.size(); ++i) steps.push_back(poses[i].t_s - poses[i - 1].t_s);
+    const double step = steps.empty() ? 0 : quantile(steps, 0.5);
     return {{},
-            "The target was seen in too few pictures that follow each other: " + std::to_string(turns.size()) +
-                " pairs, " + std::to_string(kLeastSteps) + " are needed."};
+            "The target was seen in too few pictures that follow each other within " + to_text(kLongestStep) +
+                " s: " + std::to_string(turns.size()) + " pairs, " + std::to_string(kLeastSteps) + " are needed" +
+                (step > kLongestStep ? "; it is seen every " + to_text(step, 2) +
+                                           " s, too rarely: let the camera take at least 3 pictures a second."
+                                     : ".")};
   }
   const MeanRate gyro(imu);
   double low = imu.front().t_s - turns.back().to_s;
   double high = imu.back().t_s - turns.front().from_s;
   if (given_offset_s) {
-    low = *given_offset_s - 0.5;
-    high = *given_offset_s + 0.5;
+    low = *given_offset_s - kAroundGiven;
+    high = *given_offset_s + kAroundGiven;
   }
   CameraImuStart out;
   out.curve = correlate(turns, gyro, low, high);
@@ -308,8 +328,9 @@ StartResult find_start(std::span<const CameraPoseSample> poses, std::span<const 
                   " rad/s): turn it briskly about all three axes."};
     }
     return {{},
-            "Camera and gyroscope do not turn alike at any offset of their clocks (correlation " +
-                to_text(peaks.empty() ? 0 : std::max(peaks.front().correlation, 0.0), 2) + ", " +
+            "Camera and gyroscope do not turn alike at any offset of their clocks" +
+                (given_offset_s ? " within " + to_text(kAroundGiven) + " s of the one that was given" : std::string()) +
+                " (correlation " + to_text(peaks.empty() ? 0 : std::max(peaks.front().correlation, 0.0), 2) + ", " +
                 to_text(kLeastCorrelation) +
                 " is needed): are both recordings of the same motion, and does the rig turn?"};
   }

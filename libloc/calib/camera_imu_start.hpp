@@ -32,6 +32,7 @@ class MeanRate {
   Eigen::Vector3d between(double from_s, double to_s) const;
   double begin_s() const { return times_.front(); }
   double end_s() const { return times_.back(); }
+  const std::vector<double>& times_s() const { return times_; }
 
  private:
   Eigen::Vector3d integral(double t_s) const;
@@ -40,8 +41,19 @@ class MeanRate {
   std::vector<Eigen::Vector3d> rates_;
 };
 
-/// Turn of the body from one time to the other, in its axes at the first: R(to) = R(from) turn.
-Eigen::Quaterniond turn_between(const MeanRate& gyro, const Eigen::Vector3d& bias, double from_s, double to_s);
+/// How the gyroscope says that the body turned between any two times.
+class GyroTurns {
+ public:
+  GyroTurns(std::span<const ImuRow> imu, const Eigen::Vector3d& bias);
+  /// In the body's axes at the first: R(to) = R(from) turn.
+  Eigen::Quaterniond between(double from_s, double to_s) const;
+
+ private:
+  Eigen::Quaterniond since_begin(double t_s) const;
+  MeanRate rate_;
+  Eigen::Vector3d bias_;
+  std::vector<Eigen::Quaterniond> turns_;  // from the first sample to each
+};
 
 struct StartResult {
   std::optional<CameraImuStart> start;
