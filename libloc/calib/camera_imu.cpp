@@ -50,6 +50,7 @@ constexpr int kMostGroups = 24;
 constexpr double kUsualIntrinsicsSigma = 5e-4;  // of the focal length; of the principal point as a share of it
 constexpr double kUsualDistortionSigma = 1e-3;
 constexpr double kLeastPriorSigma = 1e-9;
+constexpr const char* kMethod = "camera-imu";
 
 double cpu_s() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
@@ -216,6 +217,45 @@ double camera_period(const std::vector<FrameRow>& frames) {
   return steps.empty() ? 0 : quantile(steps, 0.5);
 }
 
+// The normal equations twice (with their factors), and the weights of each sample.
+void check_memory(const calib::ChainPlan& plan, const CameraImuRecording& recording, const CameraImuOptions& options) {
+  const double unknowns = 6.0 * (plan.segments_per_window + plan.grid.order) + 6.0 * plan.biases_per_window;
+  const double mb = 1e-6 * (2 * 8 * plan.windows * unknowns * unknowns +
+                            2.0 * sizeof(SplineWeights) * static_cast<double>(recording.imu.size()));
+  if (mb <= options.memory_limit_mb) return;
+  throw DataError("the recording holds " + to_text(plan.grid.end_s() - plan.grid.start_s, 3) +
+                  " s with pictures and samples, for which the solution needs about " + to_text(mb, 2) + " MB, and " +
+                  to_text(options.memory_limit_mb) +
+                  " are allowed (memory_limit_mb): a minute or two of brisk motion is enough, take a part of it");
+}
+
+// What a rig says of the cameras.
+void put_qualities(const CameraImuOptions& options, CameraImuFit& fit) {
+  for (CameraImuCamera& camera : fit.cameras) {
+    const std::int64_t used = std::ranges::count_if(camera.views, &CameraImuView::used);
+    MountingQuality mounting;
+    mounting.verdict = fit.quality.verdict;
+    mounting.reasons = fit.quality.reasons;
+    mounting.method = kMethod;
+    mounting.pictures = used;
+    mounting.set_deviations(camera.camera.T_body_camera, camera.covariance);
+    if (camera.line_delay_s.estimated) {
+      mounting.line_delay_s = camera.line_delay_s.value;
+      mounting.line_delay_sigma_s = camera.line_delay_s.sigma;
+    }
+    camera.camera.mounting_quality = mounting;
+    if (!options.refine_intrinsics) continue;
+    IntrinsicsQuality intrinsics;
+    intrinsics.verdict = fit.quality.verdict;
+    intrinsics.reasons = fit.quality.reasons;
+    intrinsics.method = kMethod;
+    intrinsics.pictures = used;
+    intrinsics.intrinsics_sigma_px = camera.intrinsics_sigma.head<4>();
+    intrinsics.distortion_sigma = camera.intrinsics_sigma.tail<4>();
+    camera.camera.intrinsics_quality = intrinsics;
+  }
+}
+
 // Equations at the solution for all unknowns that there could be.
 calib::SharedEquations equations_of(const CameraImuProblem& problem, const CameraImuState& state,
                                     const calib::SharedChoice& choice, const CameraImuOptions& options) {
@@ -225,6 +265,8 @@ calib::SharedEquations equations_of(const CameraImuProblem& problem, const Camer
   all.intrinsics = true;
   all.drift = true;
   all.gravity_size = true;
+  all.target_scale = true;
+  all.imu_matrices = true;
   all.line_delay = choice.line_delay || options.check_line_delay;
   out.all = calib::shared_layout(state.cameras, all);
   CameraImuProblem wide = problem;
@@ -305,6 +347,7 @@ void CameraImuOptions::check() const {
   if (time_offset_s) require_finite("time_offset_s", *time_offset_s);
   require(max_iterations > 0, "max_iterations", max_iterations, "must be positive");
   require_not_negative("time_limit_s", time_limit_s);
+  require_positive("memory_limit_mb", memory_limit_mb);
 }
 
 CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<const CameraRecording> cameras,
@@ -336,6 +379,7 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
   const calib::ChainPlan plan = calib::plan_chain(begin, end, knots.spacing_s, options.order, options.bias_spacing_s);
   fit.knot_spacing_s = plan.grid.spacing_s;
   fit.knot_reason = knots.reason;
+  check_memory(plan, recording, options);
   fit.bandwidth_hz = knots.bandwidth_hz;
   const DiscreteImuNoise sample = discretise(noise, dt);
   const DiscreteImuNoise knot = discretise(noise, plan.bias_spacing_s());
@@ -358,10 +402,13 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
     frames.insert(frames.end(), std::make_move_iterator(own.begin()), std::make_move_iterator(own.end()));
     intrinsics_sigma.push_back(sigma_of_intrinsics(camera));
     // Where nobody measured them, what they are taken to be is no measurement either.
-    const bool known = camera.intrinsics_quality && camera.intrinsics_quality->intrinsics_sigma_px.allFinite();
-    priors.push_back(
-        {calib::parameters_of(camera), known ? Vector8d(intrinsics_sigma.back().cwiseMax(kLeastPriorSigma))
-                                             : Vector8d(Vector8d::Constant(std::numeric_limits<double>::infinity()))});
+    Vector8d prior = Vector8d::Constant(std::numeric_limits<double>::infinity());
+    if (const auto& known = camera.intrinsics_quality) {
+      const Vector8d sigma = intrinsics_sigma.back().cwiseMax(kLeastPriorSigma);
+      if (known->intrinsics_sigma_px.allFinite()) prior.head<4>() = sigma.head<4>();
+      if (known->distortion_sigma.allFinite()) prior.tail<4>() = sigma.tail<4>();
+    }
+    priors.push_back({calib::parameters_of(camera), prior});
   }
   CameraImuProblem problem(recording.imu, std::move(frames),
                            {sample.sigma_angular_velocity, sample.sigma_specific_force, knot.sigma_gyroscope_bias_step,
@@ -376,8 +423,11 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
   fit.start_cpu_s = cpu_s() - begin_cpu;
 
   const double solve_begin = cpu_s();
-  const calib::SharedChoice choice{options.refine_intrinsics, options.estimate_line_delay, options.estimate_drift,
-                                   options.estimate_gravity, options.estimate_imu_matrices};
+  const calib::SharedChoice choice{.intrinsics = options.refine_intrinsics,
+                                   .line_delay = options.estimate_line_delay,
+                                   .drift = options.estimate_drift,
+                                   .gravity_size = options.estimate_gravity,
+                                   .imu_matrices = options.estimate_imu_matrices};
   const SharedLayout shared = calib::shared_layout(state.cameras, choice);
   {  // its matrices are large, and others of that size follow
     Solver solver(problem, shared, options, recording.cameras.front().origin_offset_s, begin_time, fit);
@@ -402,13 +452,11 @@ CameraImuFit calibrate_camera_imu(const CalibrationTarget& target, std::span<con
     }
   }
   fit.gravity_target = state.gravity;
-  fit.gyroscope_matrix = state.gyro_matrix;
-  fit.accelerometer_matrix = state.accel_matrix;
-  const std::vector<Vector8d> change_sigma =
-      calib::put_deviations(equations_of(problem, state, choice, options), state, intrinsics_sigma, fit);
   put_residuals(problem, state, recording, options.loss_sigmas, fit);
   const double length = to_seconds(recording.time_of(end) - recording.time_of(begin));
-  calib::judge(options, change_sigma, knots.too_fast, length, fit);
+  calib::conclude(equations_of(problem, state, choice, options), state, options, intrinsics_sigma, knots.too_fast,
+                  length, fit);
+  put_qualities(options, fit);
   fit.solve_cpu_s = cpu_s() - solve_begin;
   return fit;
 }

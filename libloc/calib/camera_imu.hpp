@@ -22,7 +22,7 @@
 // Not observable: the lever arm along the axis, when the rig turns about one axis only; anything, when it does not
 // turn. That is refused at the start. Gravity's size only scales with the target's, and both are taken as known unless
 // estimate_gravity is set; what the recording would make of it, of drift and line delay is told all the same.
-// Memory: 4 MB for each second with 200 Hz and knots of 20 ms.
+// Memory: 4 MB for each second with 200 Hz and knots of 20 ms. Seconds without pictures or samples are cut out.
 #pragma once
 
 #include <Eigen/Core>
@@ -96,9 +96,10 @@ struct CameraImuOptions {
   bool estimate_gravity = false;  ///< its size too: for a target whose size is certain, an accelerometer whose scale is
   bool estimate_imu_matrices = false;  ///< scale and misalignment of gyroscope and accelerometer
   /// @}
-  bool check_line_delay = true;  ///< where it is not estimated: would it be something else than 0?
-  int max_iterations = 50;
-  double time_limit_s = 0;  ///< 0: none
+  bool check_line_delay = true;   ///< where it is not estimated: would it be something else than 0?
+  int max_iterations = 100;       ///< in all
+  double time_limit_s = 0;        ///< of the start and the solution; 0: none
+  double memory_limit_mb = 4000;  ///< what needs more is refused; that is about twenty minutes with 200 Hz
   std::function<bool(const CameraImuProgress&)>
       progress{};  ///< after each iteration; false: stop, the best so far counts
 
@@ -117,7 +118,7 @@ struct CameraImuView {
 /// A corner of a picture that was used.
 struct CameraImuCorner {
   std::int32_t view = 0;
-  std::int32_t id = 0;
+  std::int32_t id = 0;  ///< as it was given
   Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
   Eigen::Vector2d residual_px = Eigen::Vector2d::Zero();  ///< found less projected
   double weight = 1;                                      ///< that the loss leaves it
@@ -127,6 +128,13 @@ struct CameraImuCorner {
 struct CameraImuCheck {
   double value = kUnknown;
   double sigma = kUnknown;
+  bool estimated = false;
+};
+
+/// Likewise a matrix, entry by entry.
+struct CameraImuMatrixCheck {
+  Eigen::Matrix3d value = Eigen::Matrix3d::Constant(kUnknown);
+  Eigen::Matrix3d sigma = Eigen::Matrix3d::Constant(kUnknown);
   bool estimated = false;
 };
 
@@ -145,7 +153,8 @@ struct CameraImuCamera {
   Vector7d sigma_by_noise = Vector7d::Zero();       ///< from the noise as given or adapted
   Vector7d sigma_by_blocks = Vector7d::Zero();      ///< from how pieces of the recording pull
   Vector7d sigma_by_intrinsics = Vector7d::Zero();  ///< from the deviations of the camera's intrinsics
-  CameraCalibration camera;                         ///< as given, with pose and offset; intrinsics when refined
+  /// As given, with pose, offset and mounting_quality; when refined with intrinsics and their quality.
+  CameraCalibration camera;
   Vector8d intrinsics_sigma =
       Vector8d::Zero();  ///< that were taken for fx fy cx cy and the distortion; when refined: found
   Vector8d intrinsics_change = Vector8d::Zero();  ///< that the recording would make, or has made when refined
@@ -156,7 +165,7 @@ struct CameraImuCamera {
   CameraImuStart start;
   std::vector<CameraImuView> views;
   std::vector<CameraImuCorner> corners;
-  double corner_chi = 0;  ///< root of the mean square of the residuals over their deviation: 1 is right
+  double corner_chi = 0;  ///< root of the mean square of the residuals over their deviation, as the loss leaves them
 };
 
 struct CameraImuFit {
@@ -164,12 +173,13 @@ struct CameraImuFit {
   Eigen::Vector3d gravity_target = Eigen::Vector3d::Zero();  ///< [m/s^2]
   double gravity_direction_sigma = 0;                        ///< [rad]
   CameraImuCheck gravity_size;                               ///< [m/s^2]
+  /// The target's true size over what it was said to be, by the accelerometer. Never estimated: a ruler knows better.
+  CameraImuCheck target_scale;
   /// reading = matrix * what the sensor feels + bias; of the gyroscope all entries, of the accelerometer a lower
-  /// triangle (body is the frame in which it is one). @{
-  Eigen::Matrix3d gyroscope_matrix = Eigen::Matrix3d::Identity();
-  Eigen::Matrix3d gyroscope_matrix_sigma = Eigen::Matrix3d::Zero();
-  Eigen::Matrix3d accelerometer_matrix = Eigen::Matrix3d::Identity();
-  Eigen::Matrix3d accelerometer_matrix_sigma = Eigen::Matrix3d::Zero();
+  /// triangle (body is the frame in which it is one). Where they were held, what one step says is for a warning, not
+  /// for use. @{
+  CameraImuMatrixCheck gyroscope_matrix;
+  CameraImuMatrixCheck accelerometer_matrix;
   /// @}
   std::vector<TimeNs> bias_time_ns;
   Eigen::MatrixXd biases;  ///< (6, n) gyroscope [rad/s] above accelerometer [m/s^2], straight between the times

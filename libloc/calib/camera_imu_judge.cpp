@@ -1,9 +1,12 @@
 #include "libloc/calib/camera_imu_judge.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "libloc/calib/dense.hpp"
 #include "libloc/core/check.hpp"
@@ -18,13 +21,16 @@ using Eigen::VectorXd;
 constexpr double kLeastPivot = 1e-13;
 constexpr double kAlikePeaks = 0.9;
 constexpr double kDoubtfulNoise = 3;
-constexpr double kNoNoise = 20;          // from here on it is not noise
-constexpr double kOtherGravity = 0.003;  // as a share
+constexpr double kNoNoise = 20;        // from here on it is not noise
+constexpr double kOtherScale = 0.003;  // as a share
 constexpr double kPulledApart = 2;
+constexpr double kTornApart = 5;
 constexpr double kByChance = 2;  // deviations
 // Deviations from which what was held is something else. What was held wrongly also pulls pieces of the recording
 // apart, so the deviations have grown with it.
 constexpr double kSignificant = 2.5;
+constexpr double kOfMany = 1.4;           // of that, for the largest of a matrix
+constexpr double kMovedFar = 3;           // deviations
 constexpr double kRollingShutter = 1e-3;  // [s] from the first row to the last
 constexpr double kDrift = 1e-4;           // [s] over the recording
 constexpr double kIntrinsicsPull = 1;     // [px]
@@ -66,7 +72,8 @@ double growth_by_blocks(double by_noise, double by_blocks, double groups) {
 struct Part {
   std::vector<int> places;
   double groups = 0;
-  MatrixXd covariance;  // by noise
+  double gain = kUnknown;  // that the step lowers the cost by
+  MatrixXd covariance;     // by noise; NaN, as all that follows: they are not determined
   VectorXd step;
   VectorXd by_noise;
   VectorXd by_blocks;
@@ -95,6 +102,7 @@ Part solve_for(const SharedEquations& e, std::vector<int> places) {
   const MatrixXd pulls = e.pulls(out.places, Eigen::all);
   const MatrixXd moves = dense::product(out.covariance, pulls);
   out.step = -moves.rowwise().sum();
+  out.gain = -0.5 * pulls.rowwise().sum().dot(out.step);
   out.by_noise = out.covariance.diagonal().cwiseSqrt();
   // About their mean: at the solution they sum up to nothing, for what was held they do not.
   const MatrixXd apart = moves.colwise() - moves.rowwise().mean();
@@ -103,41 +111,61 @@ Part solve_for(const SharedEquations& e, std::vector<int> places) {
   return out;
 }
 
-CameraImuCheck check_of(const SharedEquations& e, const Part& estimated, int place, bool was_estimated, double value) {
+// Together with what was estimated, further unknowns; those that there are.
+Part with_further(const SharedEquations& e, const Part& estimated, std::span<const int> further) {
+  std::vector<int> places = estimated.places;
+  for (const int place : further) {
+    if (place >= 0 && std::ranges::find(places, place) == places.end()) places.push_back(place);
+  }
+  return solve_for(e, std::move(places));
+}
+
+// @param also what is to be free besides, because its errors look alike
+CameraImuCheck check_of(const SharedEquations& e, const Part& estimated, int place, bool was_estimated, double value,
+                        int also = -1) {
   CameraImuCheck out;
   if (place < 0) return out;
   out.estimated = was_estimated;
-  if (was_estimated) {
-    out.value = value;
-    out.sigma = estimated.sigma(place);
-    return out;
-  }
-  std::vector<int> places = estimated.places;
-  places.push_back(place);
-  const Part with = solve_for(e, std::move(places));
-  out.value = value + with.step[with.at(place)];
-  out.sigma = with.sigma(place);
+  const Part with = was_estimated ? Part{} : with_further(e, estimated, std::array{place, also});
+  out.value = was_estimated ? value : value + with.step[with.at(place)];
+  out.sigma = was_estimated ? estimated.sigma(place) : with.sigma(place);
   return out;
 }
 
-// @returns the deviations of the change that the recording would make
-Vector8d put_intrinsics(const SharedEquations& e, const Part& estimated, std::size_t c, const Vector8d& sigma,
-                        CameraImuCamera& camera, Matrix7d& covariance) {
-  Vector8d change_sigma = Vector8d::Zero();
+// Row by row; the upper half of a lower triangle is zero.
+CameraImuMatrixCheck check_of(const SharedEquations& e, const Part& estimated, int place, bool was_estimated,
+                              const Eigen::Matrix3d& value, bool lower) {
+  CameraImuMatrixCheck out;
+  if (place < 0) return out;
+  std::vector<int> places;
+  append(places, place, lower ? 6 : 9);
+  const Part with = was_estimated ? estimated : with_further(e, estimated, places);
+  out.estimated = was_estimated;
+  out.value = value;
+  out.sigma.setZero();
+  int next = place;
+  for (Index a = 0; a < 3; ++a) {
+    for (Index b = 0; b < (lower ? a + 1 : 3); ++b, ++next) {
+      if (!was_estimated) out.value(a, b) += with.step[with.at(next)];
+      out.sigma(a, b) = with.sigma(next);
+    }
+  }
+  return out;
+}
+
+void put_intrinsics(const SharedEquations& e, const Part& estimated, std::size_t c, const Vector8d& sigma,
+                    CameraImuCamera& camera, Matrix7d& covariance) {
   const SharedLayout::OfCamera& all = e.all.cameras[c];
   const int size = all.intrinsics_size;
   std::vector<int> own;
   append(own, all.intrinsics, size);
   if (e.estimated.cameras[c].intrinsics >= 0) {
     for (int i = 0; i < size; ++i) camera.intrinsics_sigma[i] = estimated.sigma(own[static_cast<std::size_t>(i)]);
-    return change_sigma;
+    return;
   }
   camera.intrinsics_sigma.head(size) = sigma.head(size);
-  std::vector<int> places = estimated.places;
-  places.insert(places.end(), own.begin(), own.end());
-  const Part with = solve_for(e, std::move(places));
+  const Part with = with_further(e, estimated, own);
   camera.intrinsics_change.head(size) = with.step.tail(size);
-  for (int i = 0; i < size; ++i) change_sigma[i] = with.sigma(own[static_cast<std::size_t>(i)]);
   // How the mounting moves with the intrinsics that are held.
   const MatrixXd all_moves = dense::product(-estimated.covariance, e.information(estimated.places, own));
   const MatrixXd moves = all_moves.middleRows<kMountingSize>(estimated.at(all.first));
@@ -145,36 +173,165 @@ Vector8d put_intrinsics(const SharedEquations& e, const Part& estimated, std::si
   const MatrixXd by_intrinsics = dense::compose(moves, sigma.head(size).cwiseAbs2());
   camera.sigma_by_intrinsics = by_intrinsics.diagonal().cwiseSqrt();
   covariance += by_intrinsics;
-  return change_sigma;
 }
 
-void judge_camera(const CameraImuOptions& options, const CameraImuCamera& camera, const Vector8d& change_sigma,
-                  double length_s, bool several, Quality& q) {
+// ---- what was held and is something else
+
+// Something that was held, which may be the cause of what does not fit.
+struct Suspect {
+  std::vector<int> places;
+  // Of the solution with it free: what it says, empty where that is no more than chance or too little to matter.
+  std::function<std::string(const Part&)> says;
+  bool always_warn = false;
+};
+
+bool beyond_chance(const Part& with, int place, double floor) {
+  const double value = std::abs(with.step[with.at(place)]);
+  return value > floor && value > kSignificant * with.sigma(place);
+}
+
+std::string percent(double share) {
+  return to_text(100 * std::abs(share), 2) + " %";
+}
+
+std::string matrix_doubt(const Part& with, int place, bool lower, const std::string& sensor) {
+  double most = 0;
+  int at = place;
+  for (Index a = 0; a < 3; ++a) {
+    for (Index b = 0; b < (lower ? a + 1 : 3); ++b, ++at) {
+      // Of so many entries one lies beyond the usual limit by chance.
+      const double off = with.step[with.at(at)];
+      if (std::abs(off) > kSignificant * kOfMany * with.sigma(at) && std::abs(off) > std::abs(most)) most = off;
+    }
+  }
+  if (std::abs(most) < kOtherScale) return "";
+  return "The " + sensor + "'s scale or alignment seems to be off by " + percent(most) +
+         ": calibrate it, or let the IMU's matrices be estimated";
+}
+
+std::string intrinsics_doubt(const Part& with, const std::vector<int>& own, const Vector8d& sigma,
+                             const std::string& of) {
+  double pull = 0;
+  bool beyond = false;
+  for (Index i = 0; i < 4; ++i) {
+    const int place = own[static_cast<std::size_t>(i)];
+    const double change = with.step[with.at(place)];
+    pull = std::max(pull, std::abs(change));
+    beyond = beyond || std::abs(change) > 3 * std::hypot(sigma[i], with.sigma(place));
+  }
+  if (!beyond || pull < kIntrinsicsPull) return "";
+  return "This recording would change the intrinsics" + of + " by up to " + to_text(pull, 2) +
+         " px, more than their deviations allow: are they of this camera, lens and focus? Calibrate them, or let them "
+         "be refined";
+}
+
+std::vector<Suspect> suspects_of(const SharedEquations& e, const CameraImuState& state, const CameraImuOptions& options,
+                                 std::span<const Vector8d> intrinsics_sigma, double length_s, const CameraImuFit& fit) {
+  std::vector<Suspect> out;
+  const auto add = [&](int place, bool estimated, const std::function<std::string(const Part&)>& says,
+                       bool always_warn = false) {
+    if (place >= 0 && !estimated) out.push_back({{place}, says, always_warn});
+  };
+  for (std::size_t c = 0; c < fit.cameras.size(); ++c) {
+    const SharedLayout::OfCamera& all = e.all.cameras[c];
+    const SharedLayout::OfCamera& own = e.estimated.cameras[c];
+    const std::string of = fit.cameras.size() > 1 ? " of " + fit.cameras[c].camera.name : "";
+    const double height = state.cameras[c].camera.height_px;
+    add(
+        all.line_delay, own.line_delay >= 0,
+        [=](const Part& with) {
+          if (!beyond_chance(with, all.line_delay, kRollingShutter / height)) return std::string();
+          return "The rows" + of + " seem to be taken one after the other, " +
+                 to_text(1e3 * with.step[with.at(all.line_delay)] * height, 2) +
+                 " ms from the first to the last: a rolling shutter. Let the line delay be estimated";
+        },
+        true);
+    add(
+        all.drift, own.drift >= 0,
+        [=](const Part& with) {
+          if (!beyond_chance(with, all.drift, kDrift / length_s)) return std::string();
+          return "The clocks" + of + " drift apart by " + to_text(1e6 * with.step[with.at(all.drift)], 2) +
+                 " us a second: the offset holds for the middle of the recording only. Put both on one clock, or let "
+                 "the "
+                 "drift be estimated";
+        },
+        true);
+    if (own.intrinsics < 0) {
+      std::vector<int> places;
+      append(places, all.intrinsics, all.intrinsics_size);
+      const Vector8d sigma = intrinsics_sigma[c];
+      out.push_back({places, [=](const Part& with) { return intrinsics_doubt(with, places, sigma, of); }});
+    }
+  }
+  add(e.all.gravity_size, e.estimated.gravity_size >= 0, [=](const Part& with) {
+    if (!beyond_chance(with, e.all.gravity_size, kOtherScale * options.gravity)) return std::string();
+    return "Gravity seems to be " + to_text(options.gravity + with.step[with.at(e.all.gravity_size)], 4) +
+           " m/s^2, not " + to_text(options.gravity, 4) +
+           ": is it that of the place, and the accelerometer calibrated?";
+  });
+  add(e.all.target_scale, false, [=](const Part& with) {
+    if (!beyond_chance(with, e.all.target_scale, kOtherScale)) return std::string();
+    const double off = with.step[with.at(e.all.target_scale)];
+    return "By the accelerometer the target is " + percent(off) + (off > 0 ? " larger" : " smaller") +
+           " than it was said to be: measure it once more";
+  });
+  if (e.estimated.gyro_matrix < 0) {
+    for (const bool accel : {false, true}) {
+      std::vector<int> places;
+      const int first = accel ? e.all.accel_matrix : e.all.gyro_matrix;
+      append(places, first, accel ? 6 : 9);
+      out.push_back({places, [=](const Part& with) {
+                       return matrix_doubt(with, first, accel, accel ? "accelerometer" : "gyroscope");
+                     }});
+    }
+  }
+  return out;
+}
+
+// What a mounting would move by, in words, and whether that is more than was said of it.
+std::string moves_of(const SharedEquations& e, const Part& with, const CameraImuFit& fit, bool& too_far) {
+  Vector7d most = Vector7d::Zero();
+  for (std::size_t c = 0; c < fit.cameras.size(); ++c) {
+    const Vector7d step = with.step.segment<7>(with.at(e.all.cameras[c].first));
+    if ((step.array().abs() > kMovedFar * fit.cameras[c].sigma.array()).any()) too_far = true;
+    if (step.segment<3>(kShift).norm() >= most.segment<3>(kShift).norm()) most = step;
+  }
+  return " (the mounting would move by " + to_text(most.head<3>().norm() * 180 / std::numbers::pi, 2) + " deg, " +
+         to_text(1e3 * most.segment<3>(kShift).norm(), 2) + " mm, " + to_text(1e6 * std::abs(most[kOffset]), 2) +
+         " us)";
+}
+
+// One fault is seen in many quantities: the one that explains most is taken first, and the others are looked at with
+// that one free.
+bool put_doubts(const SharedEquations& e, const Part& estimated, std::vector<Suspect> suspects, const CameraImuFit& fit,
+                Quality& q) {
+  Part free = estimated;
+  while (!suspects.empty()) {
+    std::size_t best = suspects.size();
+    Part with_best;
+    std::string text;
+    for (std::size_t i = 0; i < suspects.size(); ++i) {
+      Part with = with_further(e, free, suspects[i].places);
+      if (!with.step.allFinite()) continue;
+      const std::string says = suspects[i].says(with);
+      if (says.empty() || (best < suspects.size() && with.gain <= with_best.gain)) continue;
+      best = i;
+      text = says;
+      with_best = std::move(with);
+    }
+    if (best == suspects.size()) break;
+    bool warn = suspects[best].always_warn;
+    text += moves_of(e, with_best, fit, warn) + ".";
+    q.lower_to(warn ? Verdict::kWarn : Verdict::kFair, text);
+    free = std::move(with_best);
+    suspects.erase(suspects.begin() + static_cast<std::ptrdiff_t>(best));
+  }
+  return free.places.size() > estimated.places.size();
+}
+
+// @param doubted something that was held is doubted
+void judge_camera(const CameraImuCamera& camera, bool several, bool doubted, Quality& q) {
   const std::string of = several ? " of " + camera.camera.name : "";
-  // First what was held wrongly: it spoils all that follows.
-  const CameraImuCheck& line = camera.line_delay_s;
-  const double readout = std::abs(line.value) * camera.camera.height_px;
-  if (!line.estimated && std::abs(line.value) > kSignificant * line.sigma && readout > kRollingShutter) {
-    q.lower_to(Verdict::kWarn,
-               "The rows" + of + " seem to be taken one after the other, " +
-                   to_text(1e3 * line.value * camera.camera.height_px, 2) +
-                   " ms from the first to the last: a rolling shutter. Let the line delay be estimated.");
-  }
-  const CameraImuCheck& drift = camera.offset_drift;
-  if (!drift.estimated && std::abs(drift.value) > kSignificant * drift.sigma &&
-      std::abs(drift.value) * length_s > kDrift) {
-    q.lower_to(Verdict::kWarn, "The clocks" + of + " drift apart by " + to_text(1e6 * drift.value, 2) +
-                                   " us a second: the offset holds for the middle of the recording only. Put both on "
-                                   "one clock, or let the drift be estimated.");
-  }
-  const double pull = camera.intrinsics_change.head<4>().cwiseAbs().maxCoeff();
-  if (!options.refine_intrinsics && pull > kIntrinsicsPull &&
-      (camera.intrinsics_change.head<4>().cwiseAbs2().array() >
-       9 * (camera.intrinsics_sigma.head<4>().cwiseAbs2() + change_sigma.head<4>().cwiseAbs2()).array())
-          .any()) {
-    q.lower_to(Verdict::kFair, "This recording would change the intrinsics" + of + " by up to " + to_text(pull, 2) +
-                                   " px, more than their deviations allow: are they of this camera, lens and focus?");
-  }
   const auto by_size = [&](double value, double fair, double warn, double refused, const std::string& text) {
     if (value < fair) return;
     const Verdict verdict = value < warn ? Verdict::kFair : value < refused ? Verdict::kWarn : Verdict::kRefused;
@@ -197,9 +354,11 @@ void judge_camera(const CameraImuOptions& options, const CameraImuCamera& camera
   }
   const double blocks = (camera.sigma_by_blocks.array() / camera.sigma_by_noise.array()).maxCoeff();
   if (blocks > kPulledApart) {
-    q.lower_to(Verdict::kFair, "Parts of the recording" + of + " pull apart " + to_text(blocks, 2) +
-                                   " times more than noise can (blurred pictures, the lens at the image's edge, "
-                                   "coloured residuals of the IMU); the deviations take that into account.");
+    q.lower_to(blocks < kTornApart ? Verdict::kFair : Verdict::kWarn,
+               "Parts of the recording" + of + " pull apart " + to_text(blocks, 2) + " times more than noise can" +
+                   (doubted ? "; what is said above may be why"
+                            : " (blurred pictures, the lens at the image's edge, coloured residuals of the IMU)") +
+                   ". The deviations take that into account.");
   }
   const auto used = std::ranges::count_if(camera.views, &CameraImuView::used);
   if (2 * used < static_cast<std::ptrdiff_t>(camera.views.size())) {
@@ -208,13 +367,8 @@ void judge_camera(const CameraImuOptions& options, const CameraImuCamera& camera
   }
 }
 
-}  // namespace
-
-std::vector<Vector8d> put_deviations(const SharedEquations& e, const CameraImuState& state,
-                                     std::span<const Vector8d> intrinsics_sigma, CameraImuFit& fit) {
-  const Part estimated = solve_for(e, estimated_places(e));
-  if (!estimated.by_noise.allFinite()) throw DataError("the recording does not determine the calibration");
-  std::vector<Vector8d> change_sigma;
+void put_deviations(const SharedEquations& e, const Part& estimated, const CameraImuState& state,
+                    std::span<const Vector8d> intrinsics_sigma, CameraImuFit& fit) {
   for (std::size_t c = 0; c < fit.cameras.size(); ++c) {
     CameraImuCamera& camera = fit.cameras[c];
     const SharedLayout::OfCamera& all = e.all.cameras[c];
@@ -227,7 +381,7 @@ std::vector<Vector8d> put_deviations(const SharedEquations& e, const CameraImuSt
       grown[i] = growth_by_blocks(camera.sigma_by_noise[i], camera.sigma_by_blocks[i], estimated.groups);
     }
     camera.covariance = grown.asDiagonal() * estimated.covariance.block<7, 7>(at, at) * grown.asDiagonal();
-    change_sigma.push_back(put_intrinsics(e, estimated, c, intrinsics_sigma[c], camera, camera.covariance));
+    put_intrinsics(e, estimated, c, intrinsics_sigma[c], camera, camera.covariance);
     camera.sigma = camera.covariance.diagonal().cwiseSqrt();
     camera.line_delay_s = check_of(e, estimated, all.line_delay, own.line_delay >= 0, state.cameras[c].line_delay_s);
     camera.offset_drift = check_of(e, estimated, all.drift, own.drift >= 0, state.cameras[c].drift);
@@ -235,32 +389,29 @@ std::vector<Vector8d> put_deviations(const SharedEquations& e, const CameraImuSt
   fit.gravity_direction_sigma =
       std::hypot(estimated.sigma(e.all.gravity), estimated.sigma(e.all.gravity + 1)) / std::numbers::sqrt2;
   fit.gravity_size = check_of(e, estimated, e.all.gravity_size, e.estimated.gravity_size >= 0, state.gravity.norm());
-  if (e.estimated.gyro_matrix >= 0) {
-    int gyro = e.all.gyro_matrix;
-    int accel = e.all.accel_matrix;
-    for (Index a = 0; a < 3; ++a) {
-      for (Index b = 0; b < 3; ++b) fit.gyroscope_matrix_sigma(a, b) = estimated.sigma(gyro++);
-      for (Index b = 0; b <= a; ++b) fit.accelerometer_matrix_sigma(a, b) = estimated.sigma(accel++);
-    }
-  }
-  return change_sigma;
+  const bool matrices = e.estimated.gyro_matrix >= 0;
+  // A scale of the accelerometer is in gravity's size as well.
+  fit.target_scale = check_of(e, estimated, e.all.target_scale, false, state.target_scale, e.all.gravity_size);
+  fit.gyroscope_matrix = check_of(e, estimated, e.all.gyro_matrix, matrices, state.gyro_matrix, false);
+  fit.accelerometer_matrix = check_of(e, estimated, e.all.accel_matrix, matrices, state.accel_matrix, true);
 }
 
-void judge(const CameraImuOptions& options, std::span<const Vector8d> change_sigma, bool too_fast, double length_s,
-           CameraImuFit& fit) {
+}  // namespace
+
+void conclude(const SharedEquations& e, const CameraImuState& state, const CameraImuOptions& options,
+              std::span<const Vector8d> intrinsics_sigma, bool too_fast, double length_s, CameraImuFit& fit) {
+  const Part estimated = solve_for(e, estimated_places(e));
+  if (!estimated.by_noise.allFinite()) throw DataError("the recording does not determine the calibration");
+  put_deviations(e, estimated, state, intrinsics_sigma, fit);
   Quality& q = fit.quality;
   if (!fit.converged) {
     q.lower_to(Verdict::kRefused, "The solution has not settled" +
                                       (fit.stopped.empty() ? std::string() : " (" + fit.stopped + ")") +
                                       ": give it more time, or a better recording.");
   }
-  const CameraImuCheck& gravity = fit.gravity_size;
-  if (!gravity.estimated && std::abs(gravity.value - options.gravity) > kSignificant * gravity.sigma &&
-      std::abs(gravity.value / options.gravity - 1) > kOtherGravity) {
-    q.lower_to(Verdict::kWarn, "Gravity seems to be " + to_text(gravity.value, 4) + " m/s^2, not " +
-                                   to_text(options.gravity, 4) +
-                                   ": is the target as large as it was said to be, and the accelerometer calibrated?");
-  }
+  // First what was held wrongly: it spoils all that follows.
+  const bool doubted =
+      put_doubts(e, estimated, suspects_of(e, state, options, intrinsics_sigma, length_s, fit), fit, q);
   const auto noisy = [&](double scale, const std::string& sensor) {
     if (scale < kDoubtfulNoise) return;
     q.lower_to(scale < kNoNoise ? Verdict::kFair : Verdict::kWarn,
@@ -270,9 +421,7 @@ void judge(const CameraImuOptions& options, std::span<const Vector8d> change_sig
   };
   noisy(fit.gyroscope_noise_scale, "gyroscope");
   noisy(fit.accelerometer_noise_scale, "accelerometer");
-  for (std::size_t c = 0; c < fit.cameras.size(); ++c) {
-    judge_camera(options, fit.cameras[c], change_sigma[c], length_s, fit.cameras.size() > 1, q);
-  }
+  for (const CameraImuCamera& camera : fit.cameras) judge_camera(camera, fit.cameras.size() > 1, doubted, q);
   if (too_fast) {
     q.lower_to(Verdict::kWarn, "The rig was moved faster than the knots can follow (" + fit.knot_reason +
                                    "): move it more gently, or take a faster IMU.");

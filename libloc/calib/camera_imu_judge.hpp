@@ -19,15 +19,12 @@ struct SharedEquations {
   Eigen::MatrixXd pulls;        // gradient by all, one column a group of windows
 };
 
-/// Deviations and covariance of each camera's mounting, and what was held: one step from where it is.
+/// Deviations and covariance of each camera's mounting; what was held: one step from where it is; and the verdict.
+/// Needs what became of the pictures in fit.
 /// @param intrinsics_sigma of each camera, for intrinsics that were not refined
-/// @returns deviations of the cameras' intrinsics_change, as far as intrinsics were held
-std::vector<Vector8d> put_deviations(const SharedEquations& equations, const CameraImuState& state,
-                                     std::span<const Vector8d> intrinsics_sigma, CameraImuFit& fit);
-
-/// The verdict. @param change_sigma what put_deviations() gave
-/// @param too_fast the motion is more than the knots can follow
-void judge(const CameraImuOptions& options, std::span<const Vector8d> change_sigma, bool too_fast, double length_s,
-           CameraImuFit& fit);
+/// @param too_fast the motion is more than the knots can follow @param length_s of the recording
+/// @throws DataError where the equations do not determine the mounting.
+void conclude(const SharedEquations& equations, const CameraImuState& state, const CameraImuOptions& options,
+              std::span<const Vector8d> intrinsics_sigma, bool too_fast, double length_s, CameraImuFit& fit);
 
 }  // namespace loc::calib

@@ -72,7 +72,8 @@ double bandwidth_of(const std::vector<Eigen::Vector3d>& samples, std::size_t pie
 }
 
 double knots_per_period(int order) {
-  return order >= 6 ? 5 : order == 5 ? 6.5 : 8;
+  // Of order 3 the acceleration jumps at each knot.
+  return order >= 6 ? 5 : order == 5 ? 6.5 : order == 4 ? 8 : 16;
 }
 
 bool in_step(double a, double b) {
@@ -104,8 +105,10 @@ KnotChoice choose_knots(std::span<const ImuRow> imu, int order, double given_s, 
   const auto ms = [](double s) { return to_text(1e3 * s, 3) + " ms"; };
   const double wanted = out.bandwidth_hz > 0 ? 1 / (knots_per_period(order) * out.bandwidth_hz) : kUsualSamples * dt;
   const double least = kLeastSamples * dt;
-  const std::string motion = "the motion reaches " + to_text(out.bandwidth_hz, 2) + " Hz, for which order " +
-                             std::to_string(order) + " needs knots at most " + ms(wanted) + " apart";
+  const std::string motion = out.bandwidth_hz == 0
+                                 ? std::string("the recording is too short, or too quiet, for a spectrum")
+                                 : "the motion reaches " + to_text(out.bandwidth_hz, 2) + " Hz, for which order " +
+                                       std::to_string(order) + " needs knots at most " + ms(wanted) + " apart";
   if (given_s > 0) {
     out.spacing_s = given_s;
     out.too_fast = given_s > 1.5 * wanted;
@@ -123,9 +126,10 @@ KnotChoice choose_knots(std::span<const ImuRow> imu, int order, double given_s, 
     out.reason = ms(least) + ", two samples of the IMU: " + motion + ", which this IMU is too slow for.";
   }
   if (camera_period_s > 0 && in_step(out.spacing_s, camera_period_s)) {
-    out.spacing_s *= kOutOfStep;
-    out.reason += " Shortened to " + ms(out.spacing_s) + ", so that the knots do not keep step with the camera (" +
-                  ms(camera_period_s) + ").";
+    const bool shorter = out.spacing_s * kOutOfStep >= least;
+    out.spacing_s *= shorter ? kOutOfStep : 1 / kOutOfStep;
+    out.reason += (shorter ? " Shortened to " : " Lengthened to ") + ms(out.spacing_s) +
+                  ", so that the knots do not keep step with the camera (" + ms(camera_period_s) + ").";
   }
   return out;
 }

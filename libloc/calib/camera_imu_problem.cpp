@@ -41,7 +41,12 @@ ChainPlan plan_chain(double begin_s, double end_s, double spacing_s, int order, 
     plan.biases_per_window = (least + per_bias - 1) / per_bias;
     plan.segments_per_window = plan.biases_per_window * per_bias;
   }
-  plan.windows = std::max(1, static_cast<int>(std::lround(length / (spacing_s * plan.segments_per_window))));
+  const double wanted = std::ceil(length / spacing_s - 1e-6);
+  plan.windows = std::max(1, static_cast<int>(std::lround(wanted / plan.segments_per_window)));
+  const auto per_bias_step =
+      static_cast<int>(std::ceil(wanted / (static_cast<double>(plan.windows) * plan.biases_per_window)));
+  plan.segments_per_window =
+      plan.biases_per_window * std::max(per_bias_step, (least + plan.biases_per_window - 1) / plan.biases_per_window);
   const int segments = plan.windows * plan.segments_per_window;
   plan.grid = {begin_s, length / segments, segments, order};
   plan.grid.check();
@@ -98,6 +103,7 @@ SharedLayout shared_layout(std::span<const CameraState> cameras, const SharedCho
   }
   out.gravity = take(true, 2);
   out.gravity_size = take(choice.gravity_size, 1);
+  out.target_scale = take(choice.target_scale, 1);
   out.gyro_matrix = take(choice.imu_matrices, 9);
   out.accel_matrix = take(choice.imu_matrices, 6);
   out.size = next;
@@ -233,7 +239,7 @@ void CameraImuProblem::add_imu(const CameraImuState& state, int segment, const S
         rotation_of(state, scratch, segment, w, imu_cumulative_[i], system != nullptr ? &scratch.by : nullptr);
     const Matrix3d R_transposed = r.rotation.conjugate().toRotationMatrix();
     const Vector3d acceleration = points * Eigen::Map<const VectorXd>(w.second.data(), k);
-    const Vector3d force = R_transposed * (acceleration - state.gravity);
+    const Vector3d force = R_transposed * (state.target_scale * acceleration - state.gravity);
     const double share = (imu_[i].t_s - knot_s) / plan_.bias_spacing_s();
     const Vector6d bias = (1 - share) * state.biases.col(knot) + share * state.biases.col(knot + 1);
     scratch.residual.segment<3>(row) = (G * r.angular_velocity + bias.head<3>() - imu_[i].gyro) / sigmas_.gyro;
@@ -248,7 +254,7 @@ void CameraImuProblem::add_imu(const CameraImuState& state, int segment, const S
       const auto c = static_cast<std::size_t>(j);
       scratch.jacobian.block<3, 3>(row, 6 * j) = rate * scratch.by.angular_velocity[c];
       scratch.jacobian.block<3, 3>(row + 3, 6 * j) = force_by_turn * scratch.by.rotation[c];
-      scratch.jacobian.block<3, 3>(row + 3, 6 * j + 3) = force_by_acceleration * w.second[c];
+      scratch.jacobian.block<3, 3>(row + 3, 6 * j + 3) = force_by_acceleration * (state.target_scale * w.second[c]);
     }
     for (Index a = 0; a < 3; ++a) {
       scratch.jacobian(row + a, bias_columns + a) = (1 - share) / sigmas_.gyro;
@@ -261,6 +267,9 @@ void CameraImuProblem::add_imu(const CameraImuState& state, int segment, const S
     if (shared->gravity_size >= 0) {
       scratch.jacobian.block<3, 1>(row + 3, column(shared->gravity_size)) =
           -force_by_acceleration * state.gravity / size;
+    }
+    if (shared->target_scale >= 0) {
+      scratch.jacobian.block<3, 1>(row + 3, column(shared->target_scale)) = force_by_acceleration * acceleration;
     }
     if (shared->gyro_matrix >= 0) {
       const Index gyro = column(shared->gyro_matrix);
@@ -562,6 +571,7 @@ CameraImuState CameraImuProblem::stepped(const CameraImuState& state, const Shar
   const double size = state.gravity.norm();
   const Vector3d direction = state.gravity / size + across(state.gravity) * x.segment<2>(shared.gravity);
   out.gravity = direction.normalized() * (size + (shared.gravity_size >= 0 ? x[shared.gravity_size] : 0));
+  if (shared.target_scale >= 0) out.target_scale += x[shared.target_scale];
   if (shared.gyro_matrix >= 0) {
     int accel = shared.accel_matrix;
     for (Index a = 0; a < 3; ++a) {

@@ -53,8 +53,8 @@ struct ChainPlan {
   int bias_knots() const { return windows * biases_per_window + 1; }
   double bias_time_s(int knot) const { return grid.start_s + knot * bias_spacing_s(); }
 };
-/// A grid whose end is the end of its last window: the spacing is what comes next to the one that was asked for. Biases
-/// get knots at least every hundred segments.
+/// A grid whose end is the end of its last window: the spacing is the one that was asked for or a little less. Biases
+/// get knots at least every hundred segments or so.
 ChainPlan plan_chain(double begin_s, double end_s, double spacing_s, int order, double bias_spacing_s);
 
 struct CameraState {
@@ -75,6 +75,7 @@ struct CameraImuState {
   Eigen::MatrixXd biases;     // gyroscope above accelerometer, 6 x bias knots
   std::vector<CameraState> cameras;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  // in target
+  double target_scale = 1;                            // the target's true size over what it was said to be
   Eigen::Matrix3d gyro_matrix = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d accel_matrix = Eigen::Matrix3d::Identity();  // lower triangle
 
@@ -90,6 +91,7 @@ struct SharedChoice {
   bool line_delay = false;
   bool drift = false;
   bool gravity_size = false;
+  bool target_scale = false;
   bool imu_matrices = false;
 };
 
@@ -110,6 +112,7 @@ struct SharedLayout {
   std::vector<OfCamera> cameras;
   int gravity = 0;  // direction, two
   int gravity_size = -1;
+  int target_scale = -1;
   int gyro_matrix = -1;   // nine, row by row
   int accel_matrix = -1;  // six, lower triangle row by row
   int size = 0;

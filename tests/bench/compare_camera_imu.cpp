@@ -270,7 +270,8 @@ std::vector<Row> rows() {
     r.options.estimate_imu_matrices = true;
     const Eigen::Matrix3d truth = r.rig.gyroscope_matrix;
     r.further = [truth](const CameraImuFit& fit) {
-      return std::sqrt(((fit.gyroscope_matrix - truth).array() / fit.gyroscope_matrix_sigma.array()).square().mean());
+      return std::sqrt(
+          ((fit.gyroscope_matrix.value - truth).array() / fit.gyroscope_matrix.sigma.array()).square().mean());
     };
   });
   add("gravity's size, estimated", 20, [](Row& r) {

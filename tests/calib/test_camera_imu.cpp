@@ -252,6 +252,13 @@ TEST(CameraImu, IntrinsicsTakePart) {
   EXPECT_LT(camera.intrinsics_sigma.head<4>().maxCoeff(), 0.8);
   EXPECT_TRUE(near(camera.intrinsics_change.head<4>(), -Eigen::Vector4d(1.5, 1.2, -1.4, 1.3), 1.0));
   EXPECT_LT(in_sigmas(error_of(fit, rig, 0), camera).cwiseAbs().maxCoeff(), 4);
+  // A rig gets what was found, not what it knew before.
+  ASSERT_TRUE(camera.camera.intrinsics_quality && camera.camera.mounting_quality);
+  EXPECT_EQ(camera.camera.intrinsics_quality->method, "camera-imu");
+  EXPECT_EQ(camera.camera.intrinsics_quality->intrinsics_sigma_px, camera.intrinsics_sigma.head<4>());
+  EXPECT_EQ(camera.camera.mounting_quality->verdict, fit.quality.verdict);
+  EXPECT_NEAR(camera.camera.mounting_quality->rotation_sigma.norm(), camera.sigma.head<3>().norm(), 1e-9);
+  EXPECT_EQ(held.cameras[0].camera.intrinsics_quality->method, "simulation");
   // Where nobody measured them, something is taken to be.
   rig.camera.intrinsics_quality.reset();
   EXPECT_NEAR(calibrate(rig).cameras[0].intrinsics_sigma[0], 0.23, 0.02);
@@ -264,16 +271,17 @@ TEST(CameraImu, MatricesOfTheImuAndGravityAreFound) {
   const WavedRig rig = wave(options, 3);
   const CameraImuFit fit = calibrate(rig, {.estimate_imu_matrices = true});
   EXPECT_TRUE(fit.converged);
-  const auto off = [](const Eigen::Matrix3d& found, const Eigen::Matrix3d& truth, const Eigen::Matrix3d& sigma) {
+  const auto off = [](const CameraImuMatrixCheck& found, const Eigen::Matrix3d& truth) {
     double most = 0;
     for (int i = 0; i < 9; ++i) {
-      if (sigma(i) > 0) most = std::max(most, std::abs(found(i) - truth(i)) / sigma(i));
+      if (found.sigma(i) > 0) most = std::max(most, std::abs(found.value(i) - truth(i)) / found.sigma(i));
     }
     return most;
   };
-  EXPECT_LT(off(fit.gyroscope_matrix, options.gyroscope_matrix, fit.gyroscope_matrix_sigma), 4);
-  EXPECT_LT(off(fit.accelerometer_matrix, options.accelerometer_matrix, fit.accelerometer_matrix_sigma), 4);
-  EXPECT_LT(fit.gyroscope_matrix_sigma.maxCoeff(), 2e-3);
+  EXPECT_TRUE(fit.gyroscope_matrix.estimated);
+  EXPECT_LT(off(fit.gyroscope_matrix, options.gyroscope_matrix), 4);
+  EXPECT_LT(off(fit.accelerometer_matrix, options.accelerometer_matrix), 4);
+  EXPECT_LT(fit.gyroscope_matrix.sigma.maxCoeff(), 2e-3);
   EXPECT_LT(in_sigmas(error_of(fit, rig, 0), fit.cameras[0]).cwiseAbs().maxCoeff(), 4);
   // Gravity's size: looked at where it is held, found where it is asked for.
   const WavedRig plain = wave({.seconds = 20}, 3);
@@ -287,6 +295,49 @@ TEST(CameraImu, MatricesOfTheImuAndGravityAreFound) {
   const CameraImuFit found = calibrate(plain, {.gravity = 9.75, .estimate_gravity = true});
   EXPECT_NEAR(found.gravity_size.value, 9.80665, 4 * found.gravity_size.sigma);
   EXPECT_NEAR(found.gravity_target.norm(), found.gravity_size.value, 1e-9);
+}
+
+// One thing that was held wrongly is told by its name and its size, and nothing else is accused; where it moves the
+// mounting by more than its deviations, the verdict is a warning.
+TEST(CameraImu, WhatWasHeldWronglyIsNamed) {
+  const auto told = [](const WavedRig& rig, const std::string& name, const std::string& size) {
+    SCOPED_TRACE(name + " " + size);
+    const CameraImuFit fit = calibrate(rig);
+    const std::vector<std::string>& reasons = fit.quality.reasons;
+    ASSERT_FALSE(reasons.empty());
+    EXPECT_NE(reasons.front().find(name), std::string::npos) << reasons.front();
+    EXPECT_NE(reasons.front().find(size), std::string::npos) << reasons.front();
+    EXPECT_EQ(std::ranges::count_if(reasons,
+                                    [](const std::string& r) { return r.find("would move by") != std::string::npos; }),
+              1);
+    if (in_sigmas(error_of(fit, rig, 0), fit.cameras[0]).cwiseAbs().maxCoeff() > 5) {
+      EXPECT_EQ(fit.quality.verdict, Verdict::kWarn);
+    }
+  };
+  const WavedRigOptions plain{.seconds = 20};
+  WavedRig rig = wave(plain, 1);
+  rig.target.size_m *= 1.02;
+  told(rig, "the target is", "2 % smaller");
+  rig.target.size_m /= 1.02 * 1.05;
+  told(rig, "the target is", " % larger");
+  rig = wave(plain, 1);
+  rig.camera.intrinsics_px.head<2>() *= 1.03;
+  told(rig, "change the intrinsics", " px");
+  WavedRigOptions other = plain;
+  other.gyroscope_matrix *= 1.02;
+  told(wave(other, 1), "gyroscope's scale", "2.");
+  other.gyroscope_matrix = Eigen::Matrix3d::Identity();
+  other.gyroscope_matrix(0, 1) = 0.01;
+  told(wave(other, 1), "gyroscope's scale", " %");
+  other = plain;
+  other.accelerometer_matrix *= 1.02;
+  told(wave(other, 1), "accelerometer's scale", "2 %");
+  const CameraImuFit right = calibrate(wave(plain, 1));
+  EXPECT_EQ(right.quality.verdict, Verdict::kOk);
+  EXPECT_NEAR(right.target_scale.value, 1, 4 * right.target_scale.sigma);
+  EXPECT_LT(right.target_scale.sigma, 1e-3);
+  EXPECT_FALSE(right.gyroscope_matrix.estimated);
+  EXPECT_LT((right.gyroscope_matrix.value - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff(), 3e-3);
 }
 
 }  // namespace

@@ -257,6 +257,12 @@ TEST(CameraImu, WhatCannotBeSaysWhy) {
   }
   // Knots closer than samples are refused before any memory is asked for.
   EXPECT_THROW(calibrate(wave({.seconds = 12}, 1), {.knot_spacing_s = 0.004}), std::invalid_argument);
+  // More memory than is allowed, and fewer steps than are needed.
+  expect_data_error([&] { calibrate(wave({.seconds = 12}, 1), {.memory_limit_mb = 5}); },
+                    {"11.9", "MB", "memory_limit_mb"});
+  const CameraImuFit unfinished = calibrate(wave({.seconds = 12}, 1), {.max_iterations = 2});
+  EXPECT_EQ(unfinished.stopped, "2 iterations");
+  EXPECT_EQ(unfinished.quality.verdict, Verdict::kRefused);
   // Biases that are all but constant: knots all the same, at every hundredth of the pose's.
   const CameraImuFit even = calibrate(wave({.seconds = 12}, 1), {.bias_spacing_s = 1000});
   EXPECT_TRUE(even.converged);

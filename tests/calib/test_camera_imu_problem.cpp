@@ -36,7 +36,7 @@ struct SmallOptions {
   int order = 6;
   double bias_spacing_s = 0.4;
   RotationForm form = RotationForm::kCumulative;
-  calib::SharedChoice choice{true, true, true, true, true};
+  calib::SharedChoice choice{true, true, true, true, true, true};
 };
 
 Small small_problem(const SmallOptions& options) {
@@ -85,6 +85,7 @@ Small small_problem(const SmallOptions& options) {
     state.cameras.push_back(camera);
   }
   state.gravity = rig.gravity_target;
+  state.target_scale = 1.02;
   constexpr std::array heights{480.0, 480.0};
   std::vector<calib::FrameRow> rows;
   for (const calib::FrameRow& frame : frames) {
