@@ -356,9 +356,8 @@ void judge_camera(const CameraImuCamera& camera, bool several, bool doubted, Qua
   if (blocks > kPulledApart) {
     q.lower_to(blocks < kTornApart ? Verdict::kFair : Verdict::kWarn,
                "Parts of the recording" + of + " pull apart " + to_text(blocks, 2) + " times more than noise can" +
-                   (doubted ? "; what is said above may be why"
-                            : " (blurred pictures, the lens at the image's edge, coloured residuals of the IMU)") +
-                   ". The deviations take that into account.");
+                   " (blurred pictures, the lens at the image's edge, coloured residuals of the IMU" +
+                   (doubted ? ", or what is said above)" : ")") + ". The deviations take that into account.");
   }
   const auto used = std::ranges::count_if(camera.views, &CameraImuView::used);
   if (2 * used < static_cast<std::ptrdiff_t>(camera.views.size())) {

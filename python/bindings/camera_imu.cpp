@@ -16,6 +16,7 @@ namespace {
 using loc::CameraImuCamera;
 using loc::CameraImuCheck;
 using loc::CameraImuFit;
+using loc::CameraImuMatrixCheck;
 using loc::CameraImuOptions;
 using loc::CameraImuProgress;
 using loc::CameraImuStart;
@@ -94,8 +95,9 @@ void bind_recording_options(py::module_& m) {
       .def_readwrite("estimate_imu_matrices", &O::estimate_imu_matrices,
                      "scale and misalignment of gyroscope and accelerometer")
       .def_readwrite("check_line_delay", &O::check_line_delay, "where it is not estimated: would it be another than 0?")
-      .def_readwrite("max_iterations", &O::max_iterations)
-      .def_readwrite("time_limit_s", &O::time_limit_s, "0: none")
+      .def_readwrite("max_iterations", &O::max_iterations, "in all")
+      .def_readwrite("time_limit_s", &O::time_limit_s, "of the start and the solution; 0: none")
+      .def_readwrite("memory_limit_mb", &O::memory_limit_mb, "what needs more is refused")
       .def("check", &O::check);
 }
 
@@ -111,6 +113,10 @@ void bind_camera_imu_parts(py::module_& m) {
       .def_readonly("value", &CameraImuCheck::value)
       .def_readonly("sigma", &CameraImuCheck::sigma)
       .def_readonly("estimated", &CameraImuCheck::estimated);
+  py::class_<CameraImuMatrixCheck> matrix(m, "CameraImuMatrixCheck", "Likewise a matrix, entry by entry.");
+  matrix.def_readonly("estimated", &CameraImuMatrixCheck::estimated);
+  array_getter(matrix, "value", &CameraImuMatrixCheck::value, "(3, 3)");
+  array_getter(matrix, "sigma", &CameraImuMatrixCheck::sigma, "(3, 3)");
   py::class_<CameraImuView>(m, "CameraImuView", "What became of a picture.")
       .def_readonly("used", &CameraImuView::used)
       .def_readonly("reason", &CameraImuView::reason, "why it was not used")
@@ -141,7 +147,8 @@ void bind_mounted_camera(py::module_& m) {
   c.def_readonly("T_camera_imu", &C::T_camera_imu)
       .def_readonly("time_offset_s", &C::time_offset_s,
                     "t_imu = t_camera + offset; with a drift, in the middle of the recording")
-      .def_readonly("camera", &C::camera, "as given, with pose and offset; intrinsics when refined")
+      .def_readonly("camera", &C::camera,
+                    "as given, with pose, offset and mounting_quality; when refined with intrinsics and their quality")
       .def_readonly("line_delay_s", &C::line_delay_s, "from one row to the next")
       .def_readonly("offset_drift", &C::offset_drift, "[s/s]")
       .def_readonly("start", &C::start)
@@ -193,6 +200,9 @@ void bind_camera_imu_fit(py::module_& m) {
        "cameras", [](const F& self) { return self.cameras; }, "[CameraImuCamera], one for each that was given")
       .def_readonly("gravity_direction_sigma", &F::gravity_direction_sigma, "[rad]")
       .def_readonly("gravity_size", &F::gravity_size, "CameraImuCheck [m/s^2]")
+      .def_readonly("target_scale", &F::target_scale,
+                    "CameraImuCheck: the target's true size over what it was said to be, by the accelerometer; never "
+                    "estimated")
       .def_property_readonly(
           "biases", [](const F& self) { return to_matrix_array(self.biases.transpose()); },
           "(K, 6) gyroscope [rad/s], then accelerometer [m/s^2], straight between bias_time_ns")
@@ -235,10 +245,10 @@ void bind_camera_imu_fit(py::module_& m) {
       .def_readonly("solve_cpu_s", &F::solve_cpu_s)
       .def_readonly("quality", &F::quality);
   array_getter(f, "gravity_target", &F::gravity_target, "(3,) in target [m/s^2]");
-  array_getter(f, "gyroscope_matrix", &F::gyroscope_matrix, "(3, 3) reading = matrix * what the sensor feels + bias");
-  array_getter(f, "gyroscope_matrix_sigma", &F::gyroscope_matrix_sigma, "(3, 3)");
-  array_getter(f, "accelerometer_matrix", &F::accelerometer_matrix, "(3, 3) likewise, a lower triangle");
-  array_getter(f, "accelerometer_matrix_sigma", &F::accelerometer_matrix_sigma, "(3, 3)");
+  f.def_readonly("gyroscope_matrix", &F::gyroscope_matrix,
+                 "CameraImuMatrixCheck: reading = matrix * what the sensor feels + bias");
+  f.def_readonly("accelerometer_matrix", &F::accelerometer_matrix,
+                 "CameraImuMatrixCheck, likewise; a lower triangle: body is the frame in which it is one");
   times_getter(f, "bias_time_ns", &F::bias_time_ns, "(K,)");
   times_getter(f, "imu_time_ns", &F::imu_time_ns, "(N,) of the samples that were used");
 }

@@ -1,7 +1,7 @@
 """Inertial SLAM on EuRoC V1_01 with the camera's mounting as EuRoC gives it, and as the camera-IMU
 calibration finds it in EuRoC's recording of an AprilGrid; and with only the turn or the place of that.
 
-    python tests/bench/compare_camera_imu_slam.py [--data FOLDER]
+    python tests/bench/compare_camera_imu_slam.py [--data FOLDER] [--begins N]
 
 FOLDER: holds euroc-v101-tracks and euroc-cam-imu-calibration (default: $LIBLOC_DATA). One ATE is luck by some
 millimetres, so SLAM begins at several times; the place that Basalt publishes for this rig stands beside it.
@@ -22,7 +22,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 import compare_slam
 
 ATE_BAR_MM = 25
-BEGINS_S = range(8)
 BASALT = (-0.01677, -0.06894, 0.00514)  # its translation of T_imu_camera [m]
 
 
@@ -74,7 +73,11 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--data", type=Path, default=os.environ.get("LIBLOC_DATA"))
-    data = parser.parse_args().data
+    parser.add_argument("--begins", type=int, default=8, help="begin after 0, 1, … s (%(default)s)")
+    arguments = parser.parse_args()
+    data, begins_s = arguments.data, range(arguments.begins)
+    if len(begins_s) < 2:
+        parser.error(f"--begins {arguments.begins}: at least 2")
     for name in ("euroc-v101-tracks", "euroc-cam-imu-calibration"):
         if data is None or not (data / name).is_dir():
             print(f"skipped: {data}/{name} is absent; --data or LIBLOC_DATA names the folder")
@@ -90,10 +93,10 @@ def main() -> int:
         "its place only": (libloc.Pose3(euroc.rotation_wxyz, calibration.translation), 0.0),
         "Basalt's place": (libloc.Pose3(euroc.rotation_wxyz, BASALT), 0.0),
     }
-    print("ATE [mm] by begin [s]   " + "".join(f"{begin:8d}" for begin in BEGINS_S) + "    mean")
+    print("ATE [mm] by begin [s]   " + "".join(f"{begin:8d}" for begin in begins_s) + "    mean")
     ates = []
     for name, (T_body_camera, offset_s) in mountings.items():
-        row = [1e3 * ate(tracks, truth, begin, T_body_camera, offset_s) for begin in BEGINS_S]
+        row = [1e3 * ate(tracks, truth, begin, T_body_camera, offset_s) for begin in begins_s]
         print(f"  {name:22s}" + "".join(f"{value:8.2f}" for value in row) + f"{np.mean(row):8.2f}")
         ates.append(row)
     worse = np.array(ates[1]) - ates[0]

@@ -99,9 +99,10 @@ def _dropped_table(camera: libloc.CameraImuCamera) -> Table | None:
     return Table(f"pictures of {camera.camera.name} that were not used", ["why", "pictures"], rows)
 
 
-def _matrix_rows(name: str, matrix: np.ndarray, sigma: np.ndarray) -> list[list[str]]:
+def _matrix_rows(name: str, matrix: libloc.CameraImuMatrixCheck) -> list[list[str]]:
+    value, sigma = matrix.value, matrix.sigma
     return [
-        [f"{name}, row {axis}", *(with_sigma(matrix[i, j], sigma[i, j] or None) for j in range(3))]
+        [f"{name}, row {axis}", *(with_sigma(value[i, j], sigma[i, j] or None) for j in range(3))]
         for i, axis in enumerate("xyz")
     ]
 
@@ -176,6 +177,7 @@ def facts_of(data: CameraImuInput, fit: libloc.CameraImuFit, verdict: Verdict) -
             f"({gravity}) m/s², direction ± {np.rad2deg(fit.gravity_direction_sigma):.2g} deg; size "
             + _check_text(fit.gravity_size, 1, "m/s²"),
         ),
+        ("size of the target", f"{_check_text(fit.target_scale, 1, 'of what was said')}, by the accelerometer"),
         ("bias of the gyroscope", " ".join(f"{x:.5f}" for x in bias[:3]) + " rad/s (mean)"),
         ("bias of the accelerometer", " ".join(f"{x:.4f}" for x in bias[3:]) + " m/s² (mean)"),
         (
@@ -203,13 +205,15 @@ def tables_of(fit: libloc.CameraImuFit, refined: bool, imu_matrices: bool) -> li
         dropped = _dropped_table(camera)
         if dropped is not None:
             tables.append(dropped)
-    if imu_matrices:
+    # Not determined beside everything else that was estimated: no table.
+    if np.isfinite(fit.gyroscope_matrix.value).all():
+        kind = "estimated" if imu_matrices else "held; one step from there says"
         tables.append(
             Table(
-                "IMU: reading = matrix * what the sensor feels + bias",
+                f"IMU: reading = matrix * what the sensor feels + bias ({kind})",
                 ["", "x", "y", "z"],
-                _matrix_rows("gyroscope", fit.gyroscope_matrix, fit.gyroscope_matrix_sigma)
-                + _matrix_rows("accelerometer", fit.accelerometer_matrix, fit.accelerometer_matrix_sigma),
+                _matrix_rows("gyroscope", fit.gyroscope_matrix)
+                + _matrix_rows("accelerometer", fit.accelerometer_matrix),
             )
         )
     return tables
