@@ -18,8 +18,6 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 import libloc
 from libloc import DataError, Verdict
 from libloc.programs import (
@@ -33,17 +31,11 @@ from libloc.programs import (
     calibrate_magnetometer,
     calibrate_noise,
 )
+from libloc.programs.arguments import positive
 from libloc.programs.calibrate_input import InputOptions, Readings
 from libloc.programs.calibrate_report import Outcome, text_of, write_report
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_REFUSED, EXIT_INTERRUPTED = 0, 1, 2, 3, 130
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not (np.isfinite(value) and value > 0):
-        raise argparse.ArgumentTypeError(f"{text}: must be a positive number")
-    return value
 
 
 def _add_output_options(parser: argparse.ArgumentParser) -> None:
@@ -78,7 +70,7 @@ def _add_input_options(parser: argparse.ArgumentParser, files: str = "+") -> Non
             help="where the heading has none; counts: as the sensor gives them",
         )
     group.add_argument(
-        "--rate", type=_positive, metavar="HZ", help="readings a second, for tables without time"
+        "--rate", type=positive, metavar="HZ", help="readings a second, for tables without time"
     )
 
 

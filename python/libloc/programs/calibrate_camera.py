@@ -24,6 +24,7 @@ import libloc
 from libloc import DataError, Verdict
 from libloc.programs import calibrate_images as images
 from libloc.programs import calibrate_plots_camera as plots
+from libloc.programs.arguments import count
 from libloc.programs.calibrate_report import Outcome, Picture, Table, with_sigma
 
 MODELS = {
@@ -42,12 +43,6 @@ def _size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def count_of(text: str) -> int:
-    if not (text.isdigit() and int(text) > 0):
-        raise argparse.ArgumentTypeError(f"{text}: must be a positive whole number")
-    return int(text)
-
-
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "input", type=Path, nargs="+", metavar="INPUT", help="pictures, folder, video, LCM log"
@@ -61,11 +56,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--size", type=_size, metavar="WxH", help="of the image, for a table of corners [px]")
     group.add_argument(
-        "--step", type=count_of, metavar="N", help="search every N-th picture (videos: 500 in all)"
+        "--step", type=count, metavar="N", help="search every N-th picture (videos: 500 in all)"
     )
     group.add_argument(
         "--max-views",
-        type=count_of,
+        type=count,
         default=200,
         metavar="N",
         help="use so many, the most different ones (%(default)s)",
@@ -73,12 +68,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def check_options(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    try:
-        options.target = target_of(options.target)
-    except DataError as error:
-        parser.error(f"--target: {error}")
-    except ValueError as error:
-        parser.error(f"--{error}")
+    options.target = parse_target(parser, options.target)
     table = options.input[0].suffix.lower() == ".csv"
     if table and (len(options.input) > 1 or options.size is None):
         parser.error("a table of corners is the only INPUT, and --size WxH tells the image's size")
@@ -88,10 +78,16 @@ def check_options(parser: argparse.ArgumentParser, options: argparse.Namespace) 
         )
 
 
-def target_of(words: list[str]) -> libloc.CalibrationTarget:
-    if len(words) == 1 and words[0].lower().endswith((".yaml", ".yml")):
-        return libloc.CalibrationTarget.read_kalibr(Path(words[0]))
-    return libloc.CalibrationTarget(" ".join(words))
+def parse_target(parser: argparse.ArgumentParser, words: list[str]) -> libloc.CalibrationTarget:
+    """The words behind --target; a wrong one ends the program."""
+    try:
+        if len(words) == 1 and words[0].lower().endswith((".yaml", ".yml")):
+            return libloc.CalibrationTarget.read_kalibr(Path(words[0]))
+        return libloc.CalibrationTarget(" ".join(words))
+    except DataError as error:
+        parser.error(f"--target: {error}")
+    except ValueError as error:
+        parser.error(f"--{error}")
 
 
 def _read(options: argparse.Namespace) -> images.Corners:

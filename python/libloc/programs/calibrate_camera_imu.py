@@ -34,7 +34,8 @@ from libloc import DataError, Verdict
 from libloc.programs import calibrate_camera_imu_input as reading
 from libloc.programs import calibrate_camera_imu_live as live
 from libloc.programs import calibrate_plots_camera_imu as plots
-from libloc.programs.calibrate_camera import count_of, target_of
+from libloc.programs.arguments import count, positive
+from libloc.programs.calibrate_camera import parse_target
 from libloc.programs.calibrate_camera_imu_input import CameraImuInput
 from libloc.programs.calibrate_camera_imu_text import facts_of, tables_of
 from libloc.programs.calibrate_input import InputOptions
@@ -54,15 +55,8 @@ _SEVERITIES = {
 _QUICK_LIMIT_S = 20.0  # of a solution while more is collected
 
 
-def _positive(text: str) -> float:
-    value = float(text)
-    if not (np.isfinite(value) and value > 0):
-        raise argparse.ArgumentTypeError(f"{text}: must be a positive number")
-    return value
-
-
 def _gravity(text: str) -> float | None:
-    return None if text == "estimate" else _positive(text)
+    return None if text == "estimate" else positive(text)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -86,7 +80,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="numbers in recording and rig, several for a rig of several (%(default)s)",
     )
     group.add_argument("--imu", type=Path, metavar="FILE", help="IMU, where INPUT has none or another")
-    group.add_argument("--step", type=count_of, default=1, metavar="N", help="search every N-th picture")
+    group.add_argument("--step", type=count, default=1, metavar="N", help="search every N-th picture")
     group.add_argument(
         "--name-unit",
         choices=("ns", "us", "ms", "s"),
@@ -105,10 +99,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--rotation", choices=tuple(_ROTATIONS), default="cumulative", help="form of the spline (%(default)s)"
     )
     group.add_argument(
-        "--knot-spacing", type=_positive, metavar="S", help="[s] (default: by the IMU's spectrum)"
+        "--knot-spacing", type=positive, metavar="S", help="[s] (default: by the IMU's spectrum)"
     )
     group.add_argument(
-        "--corner-sigma", type=_positive, default=0.3, metavar="PX", help="of a corner (%(default)s)"
+        "--corner-sigma", type=positive, default=0.3, metavar="PX", help="of a corner (%(default)s)"
     )
     group.add_argument("--time-offset", type=float, metavar="S", help="t_imu - t_camera, known to 0.5 s")
     group.add_argument(
@@ -126,7 +120,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--imu-matrices", action="store_true", help="estimate the IMU's scales and misalignment"
     )
     group.add_argument(
-        "--time-limit", type=_positive, metavar="S", help="of the solution: the best so far then"
+        "--time-limit", type=positive, metavar="S", help="of the solution: the best so far then"
     )
     live.add_options(parser)
     parser.add_argument_group("result").add_argument(
@@ -139,12 +133,7 @@ def check_options(parser: argparse.ArgumentParser, options: argparse.Namespace) 
         parser.error("INPUT or --live, one of them")
     if options.live and (len(options.camera) > 1 or not options.rig):
         parser.error("--live is for one camera, and needs its intrinsics (--rig)")
-    try:
-        options.target = target_of(options.target)
-    except DataError as error:
-        parser.error(f"--target: {error}")
-    except ValueError as error:
-        parser.error(f"--{error}")
+    options.target = parse_target(parser, options.target)
     if min(options.camera) < 0 or len(set(options.camera)) < len(options.camera):
         parser.error(f"--camera {' '.join(map(str, options.camera))}: each camera once, counted from 0")
     if options.camchain is not None and options.camchain.is_dir():

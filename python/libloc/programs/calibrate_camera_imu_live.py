@@ -8,7 +8,6 @@ then what was collected goes the same way as a recording. With --report it is ke
 from __future__ import annotations
 
 import argparse
-import os
 import queue
 import sys
 import time
@@ -27,9 +26,10 @@ from numpy.typing import NDArray
 import libloc
 from libloc import DataError
 from libloc.lcm_receiver import LcmReceiver
+from libloc.programs.arguments import add_collecting, add_lcm_url
 from libloc.programs.calibrate_camera_imu_turns import CameraTurns
 from libloc.programs.calibrate_images import of_message
-from libloc.programs.calibrate_live import DEFAULT_URL, map_of_cells
+from libloc.programs.calibrate_live import map_of_cells
 from libloc.programs.calibrate_plots import new_figure
 
 _MESSAGES: Any = loc  # lcm-gen writes no types
@@ -56,12 +56,7 @@ Array = NDArray[np.float64]
 def add_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("live")
     group.add_argument("--live", action="store_true", help="collect from LCM instead of reading INPUT")
-    group.add_argument(
-        "--lcm-url",
-        default=os.environ.get("LCM_DEFAULT_URL") or DEFAULT_URL,
-        metavar="URL",
-        help="transport: udpm://GROUP:PORT?ttl=0 or tcpq://ADDRESS:PORT, where loc-hub runs (%(default)s)",
-    )
+    add_lcm_url(group)
     for name, channel, what in (
         ("image", libloc.IMAGE_CHANNEL, "pictures"),
         ("imu", libloc.IMU_CHANNEL, "IMU"),
@@ -69,20 +64,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         group.add_argument(
             f"--{name}-channel", default=channel, metavar="NAME", help=f"of the {what} (%(default)s)"
         )
-    group.add_argument(
-        "--duration",
-        type=float,
-        default=180.0,
-        metavar="S",
-        help="collect no longer than this [s] (%(default)s)",
-    )
-    group.add_argument(
-        "--patience",
-        type=float,
-        default=10.0,
-        metavar="S",
-        help="give up when no picture or no IMU sample came for this long [s] (%(default)s)",
-    )
+    add_collecting(group, 180.0, "picture or no IMU sample")
 
 
 class OtherSizeError(DataError):

@@ -8,7 +8,6 @@ readings.csv.
 from __future__ import annotations
 
 import argparse
-import os
 import queue
 import sys
 import time
@@ -25,9 +24,9 @@ import libloc
 from libloc import DataError
 from libloc.lcm_receiver import LcmReceiver
 from libloc.programs import calibrate_plots as plots
+from libloc.programs.arguments import add_collecting, add_lcm_url
 from libloc.programs.calibrate_input import SI, Readings, Triad
 
-DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"
 _EVALUATE_S, _PICTURE_S, _LINE_S = 0.5, 3.0, 1.0
 _MESSAGES: Any = loc  # lcm-gen writes no types
 _CONFIRMATIONS = 2  # evaluations in a row that must say "enough"
@@ -36,32 +35,14 @@ _CONFIRMATIONS = 2  # evaluations in a row that must say "enough"
 def add_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("live")
     group.add_argument("--live", action="store_true", help="collect from LCM instead of reading INPUT")
-    group.add_argument(
-        "--lcm-url",
-        default=os.environ.get("LCM_DEFAULT_URL") or DEFAULT_URL,
-        metavar="URL",
-        help="transport: udpm://GROUP:PORT?ttl=0 or tcpq://ADDRESS:PORT, where loc-hub runs (%(default)s)",
-    )
+    add_lcm_url(group)
     group.add_argument(
         "--channel", default=libloc.MAGNETOMETER_CHANNEL, metavar="NAME", help="of the readings (%(default)s)"
     )
     group.add_argument(
         "--imu-channel", default=libloc.IMU_CHANNEL, metavar="NAME", help="of the IMU (%(default)s)"
     )
-    group.add_argument(
-        "--duration",
-        type=float,
-        default=300.0,
-        metavar="S",
-        help="collect no longer than this [s] (%(default)s)",
-    )
-    group.add_argument(
-        "--patience",
-        type=float,
-        default=10.0,
-        metavar="S",
-        help="give up when no reading came for this long [s] (%(default)s)",
-    )
+    add_collecting(group, 300.0, "reading")
 
 
 @dataclass

@@ -18,7 +18,7 @@ import numpy as np
 
 import libloc
 from libloc import DataError, gopro
-from libloc.programs.slam_input import seconds_ns
+from libloc.programs.arguments import seconds_ns
 
 
 def make_parser() -> argparse.ArgumentParser:

@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 
 import libloc
 from libloc import DataError
+from libloc.programs.arguments import positive, seconds_ns
 from libloc.programs.slam_input import (
     METHODS,
     SlamInput,
@@ -41,20 +42,12 @@ from libloc.programs.slam_input import (
     method_of,
     read_input,
     saved_state,
-    seconds_ns,
     slam_options,
 )
 from libloc.programs.slam_pictures import Watcher
 from libloc.programs.slam_result import SlamResult, against_truth, report, text_of, write
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not (np.isfinite(value) and value > 0):
-        raise argparse.ArgumentTypeError(f"{text}: must be a positive number")
-    return value
 
 
 def _index(text: str) -> int:
@@ -96,7 +89,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--sigma-px",
-        type=_positive,
+        type=positive,
         metavar="PX",
         help="deviation of a measured coordinate (default: what the recording or else the settings say)",
     )
@@ -105,7 +98,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--rate-hz",
-        type=_positive,
+        type=positive,
         metavar="HZ",
         help="frames a second of a tracks file (default: rate_hz of the camera in --config), of a folder of "
         "numbered pictures, or of a video in place of its own times",

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass, field
-from decimal import Decimal, InvalidOperation
 from enum import IntEnum
 from pathlib import Path
 from typing import Any
@@ -19,17 +18,6 @@ from libloc.programs.slam_pictures import PictureInput, find_pictures, rig_of_eu
 
 # The methods as loc-estimator calls them.
 METHODS = {"mono-slam": SlamMotion.CONSTANT_VELOCITY, "inertial-slam": SlamMotion.INERTIAL}
-
-
-def seconds_ns(text: str) -> int:
-    """Seconds as int64 nanoseconds, exactly."""
-    try:
-        time_ns = int((Decimal(text) * 1_000_000_000).to_integral_value())
-    except (InvalidOperation, ValueError, OverflowError):
-        raise argparse.ArgumentTypeError(f"{text}: must be seconds") from None
-    if abs(time_ns) >= 2**62:
-        raise argparse.ArgumentTypeError(f"{text}: is out of range")
-    return time_ns
 
 
 @dataclass

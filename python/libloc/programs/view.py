@@ -29,7 +29,6 @@ viewer failed (the message says why), 2 wrong options, 130 interrupted: what was
 from __future__ import annotations
 
 import argparse
-import os
 import re
 import sys
 import time
@@ -44,6 +43,7 @@ import numpy as np
 import libloc
 from libloc import DataError
 from libloc.driving.video import MissingPackageError
+from libloc.programs.arguments import add_lcm_url, positive
 from libloc.view import logs, output
 from libloc.view.blueprint import Layout, blueprint
 from libloc.view.intake import Intake, channels_of
@@ -57,18 +57,10 @@ from libloc.view.space import SpaceDrawing
 from libloc.view.target import Interrupt, Target, ViewerPlan
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
-DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"
 _RESULTS = ("estimate", "frame", "map")  # what an estimator makes
 _END_S = 1.5  # without any of these, after the source has ended
 _SILENCE_S = 10.0  # after which it says that nothing comes
 _AXIS_M = 0.3  # live, until there is a map to tell
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not (np.isfinite(value) and value > 0):
-        raise argparse.ArgumentTypeError(f"{text}: must be a positive number")
-    return value
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -107,10 +99,10 @@ def make_parser() -> argparse.ArgumentParser:
         "may come several times",
     )  # fmt: skip
     parser.add_argument(
-        "--rate-hz", type=_positive, default=30.0, metavar="HZ", help="estimates drawn a second (%(default)g)"
+        "--rate-hz", type=positive, default=30.0, metavar="HZ", help="estimates drawn a second (%(default)g)"
     )
     parser.add_argument(
-        "--picture-rate-hz", type=_positive, metavar="HZ", help="pictures drawn a second (default: all)"
+        "--picture-rate-hz", type=positive, metavar="HZ", help="pictures drawn a second (default: all)"
     )
     parser.add_argument(
         "--picture-quality", type=int, default=85, choices=range(1, 101), metavar="Q",
@@ -128,22 +120,19 @@ def make_parser() -> argparse.ArgumentParser:
     )  # fmt: skip
 
     group = parser.add_argument_group("live")
-    group.add_argument(
-        "--lcm-url", default=os.environ.get("LCM_DEFAULT_URL") or DEFAULT_URL, metavar="URL",
-        help="transport: udpm://GROUP:PORT?ttl=0 or tcpq://ADDRESS:PORT, where loc-hub runs (%(default)s)",
-    )  # fmt: skip
+    add_lcm_url(group)
     group.add_argument(
         "--exit-at-end", action="store_true", help="end when the source says that it has ended"
     )
     group.add_argument(
         "--window",
-        type=_positive,
+        type=positive,
         default=60.0,
         metavar="S",
         help="of the numbers that is seen (%(default)g)",
     )
     parser.add_argument(
-        "--duration", type=_positive, default=float("inf"), metavar="S", help="of a log, or of listening"
+        "--duration", type=positive, default=float("inf"), metavar="S", help="of a log, or of listening"
     )
 
     group = parser.add_argument_group(
