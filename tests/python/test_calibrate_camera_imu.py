@@ -9,40 +9,18 @@ from libloc.lcm_log import LogWriter
 from libloc.programs import calibrate, calibrate_camera_imu
 from PIL import Image
 from support import data_folder
-from waved_rig import Waved, a_camera
+from waved_rig import Waved, a_camera, write_corners, write_imu
 
 import libloc
 
 BOARD = ("--target", "checkerboard", "9x6", "0.06")
 needs_vision = pytest.mark.skipif(not libloc.HAS_VISION, reason="built without OpenCV")
 
-IMU_HEADING = "time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
 KALIBR_HEADING = "timestamp,omega_x,omega_y,omega_z,alpha_x,alpha_y,alpha_z"
 EUROC_HEADING = (
     "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
     "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]"
 )
-
-
-def write_imu(path: Path, rig: Waved, heading: str = IMU_HEADING, unit: float = 1.0) -> Path:
-    rows = np.hstack([rig.angular_velocity * unit, rig.specific_force])
-    lines = [heading]
-    lines += [
-        f"{t}," + ",".join(repr(float(x)) for x in row) for t, row in zip(rig.imu_times_ns, rows, strict=True)
-    ]
-    path.write_text("\n".join(lines) + "\n")
-    return path
-
-
-def write_corners(path: Path, rig: Waved, camera: int = 0) -> Path:
-    lines = ["timestamp_ns,corner_id,u_px,v_px"]
-    for view in rig.views(camera):
-        lines += [
-            f"{view.time_ns},{i},{u!r},{v!r}"
-            for i, (u, v) in zip(view.ids, view.pixels_px.tolist(), strict=True)
-        ]
-    path.write_text("\n".join(lines) + "\n")
-    return path
 
 
 def write_rig(path: Path, rig: Waved) -> Path:
@@ -188,8 +166,36 @@ def test_folder_of_kalibr(pair, rendered, tmp_path, capsys):
         *(tmp_path / "cam0", tmp_path / "imu0.csv", *BOARD, "--rig", tmp_path / "other.yaml"),
         code=1,
     )
-    assert "384 x 240" in text
-    assert "320 x 200" in text
+    assert f"{tmp_path / 'cam0'}: 50 pictures of 384 x 240 pixels; cam0 of the rig has 320 x 200" in text
+
+
+@needs_vision
+def test_numbered_pictures_and_some_of_another_size(pair, rendered, tmp_path, capsys):
+    folder = tmp_path / "pictures"
+    folder.mkdir()
+    for i, picture in enumerate(rendered[0]):
+        Image.fromarray(picture).save(folder / f"frame_{i:03}.png", compress_level=1)
+    inputs = (folder, write_imu(tmp_path / "imu.csv", pair), *BOARD)
+    rig = write_rig(tmp_path / "rig.yaml", pair)
+    text = run(capsys, *inputs, "--rig", rig, code=1)
+    assert f"{folder}: when were its pictures taken? frame_000.png is no time" in text
+    assert "give --rate-hz for numbered pictures" in text
+    # Other sizes come later than the first.
+    for i in (5, 17):
+        Image.fromarray(rendered[0][i][:100, :200]).save(folder / f"frame_{i:03}.png")
+    first_s = pair.picture_times()[1][0] / 10**9
+    text = run(capsys, *inputs, "--rig", rig, "--rate-hz", 8, "--start-time", f"{first_s:.9f}", "--out", rig)
+    count = len(rendered[0])
+    assert f"cam0.pictures.searched: {count - 2}" in text
+    assert "other_size: 2" in text
+    assert "the offset of the clocks holds for this recording alone" in text
+    assert np.abs(pair.off_by_sigmas(libloc.read_rig(rig).cameras[0])).max() < 5
+    # Nobody knows when they began: the offset tells it, from the IMU's first sample on.
+    text = run(capsys, *inputs, "--rig", rig, "--rate-hz", 8, "--out", rig)
+    assert "pictures: the first picture was given the time of the first IMU sample" in text
+    found = libloc.read_rig(rig).cameras[0]
+    found.time_offset_s += float(pair.imu_times_ns[0] - pair.picture_times()[1][0]) * 1e-9
+    assert np.abs(pair.off_by_sigmas(found)).max() < 5
 
 
 @needs_vision

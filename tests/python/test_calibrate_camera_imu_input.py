@@ -12,7 +12,8 @@ from libloc.programs import calibrate, calibrate_camera_imu
 from libloc.programs import calibrate_camera_imu_input as reading
 from libloc.programs.calibrate_images import read_corner_table
 from libloc.programs.calibrate_input import InputOptions
-from waved_rig import START_NS, Waved, a_camera
+from PIL import Image
+from waved_rig import IMU_HEADING, START_NS, Waved, a_camera, imu_rows, write_corners, write_imu
 
 import libloc
 
@@ -27,28 +28,9 @@ def waved() -> Waved:
     return Waved()
 
 
-def write_corners(path: Path, waved: Waved) -> Path:
-    rows = [
-        f"{view.time_ns},{i},{u!r},{v!r}"
-        for view in waved.views()
-        for i, (u, v) in zip(view.ids, view.pixels_px.tolist(), strict=True)
-    ]
-    path.write_text("\n".join(["timestamp_ns,corner_id,u_px,v_px", *rows]) + "\n")
-    return path
-
-
-def imu_rows(waved: Waved) -> list[str]:
-    readings = np.hstack([waved.angular_velocity, waved.specific_force]).tolist()
-    return [f"{t}," + ",".join(map(repr, row)) for t, row in zip(waved.imu_times_ns, readings, strict=True)]
-
-
-IMU_HEADING = "time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
-
-
 @pytest.fixture
 def files(waved, tmp_path) -> tuple[Path, Path, Path]:
-    imu = tmp_path / "imu.csv"
-    imu.write_text("\n".join([IMU_HEADING, *imu_rows(waved)]) + "\n")
+    imu = write_imu(tmp_path / "imu.csv", waved)
     rig = tmp_path / "rig.yaml"
     libloc.write_rig(rig, waved.rig())
     return write_corners(tmp_path / "corners.csv", waved), imu, rig
@@ -286,7 +268,7 @@ def test_ctrl_c_within_the_progress_line_stops_the_solver(monkeypatch):
 
 
 @needs_vision
-def test_damaged_pictures_and_ctrl_c_in_the_search(tmp_path, monkeypatch, capsys):
+def test_pictures_that_cannot_be_used_and_ctrl_c_in_the_search(tmp_path, monkeypatch, capsys):
     target = libloc.CalibrationTarget("checkerboard 9x6 0.06")
     waved = Waved(seconds=3, camera_hz=4, cameras=[a_camera("cam0", 0.6)])
     renderings = waved.renderings()
@@ -295,6 +277,8 @@ def test_damaged_pictures_and_ctrl_c_in_the_search(tmp_path, monkeypatch, capsys
         for i, (stamp, picture) in enumerate(zip(waved.picture_times()[1], renderings, strict=True)):
             m = loc.image_t()
             m.time_ns, m.camera, m.sequence = int(stamp), 0, i
+            if i in (0, 4):
+                picture = picture[:100, : 200 + i]
             m.height, m.width = picture.shape
             m.row_stride, m.pixelformat, m.data = m.width, m.PIXEL_FORMAT_GRAY, picture.tobytes()
             if i == 2:
@@ -306,7 +290,11 @@ def test_damaged_pictures_and_ctrl_c_in_the_search(tmp_path, monkeypatch, capsys
     found, interrupted = reading.find_views(target, source, waved.cameras[0], 1, counts)
     assert not interrupted
     assert counts["cam0.pictures.skipped.damaged"] == 1
-    assert len(found.views) == counts["cam0.pictures.searched"] == len(renderings) - 1
+    assert counts["cam0.pictures.skipped.other_size"] == 2
+    assert reading._of_other_size(found).startswith(
+        "2 pictures of 200 x 100, 204 x 100 pixels; cam0 of the rig has 384 x 240: intrinsics hold"
+    )
+    assert len(found.views) == counts["cam0.pictures.searched"] == len(renderings) - 3
     assert int(waved.picture_times()[1][2]) not in [view.time_ns for view in found.views]
     assert "picture of" in found.damaged[0]
 
@@ -338,15 +326,15 @@ def test_what_is_what_in_input(tmp_path):
         path.write_text(text)
         return path
 
-    def sorted_out(*inputs: Path, cameras: tuple[int, ...] = (0,), imu: Path | None = None):
-        out = reading.sources_of(list(inputs), list(cameras), imu, "us")
+    def sorted_out(*inputs: Path, cameras: tuple[int, ...] = (0,), imu: Path | None = None, unit: str | None = None):
+        out = reading.sources_of(list(inputs), list(cameras), imu, reading.PictureTimes(name_unit=unit))
         return out.pictures, out.tables, out.imu
 
     imu = file("imu.csv", IMU_HEADING + "\n")
     named = file("named/123.png").parent
-    assert sorted_out(imu, named) == ([(named, {"name_unit": "us"})], [], imu)
+    assert sorted_out(imu, named, unit="us") == ([(named, {"name_unit": "us"})], [], imu)
     right = file("right/123.png").parent
-    both = [(right, {"name_unit": "us"}), (named, {"name_unit": "us"})]
+    both = [(right, {"name_unit": "ns"}), (named, {"name_unit": "ns"})]
     assert sorted_out(right, imu, named, cameras=(0, 1)) == (both, [], imu)
     index = file("listed/data.csv")
     file("listed/1.png")
@@ -381,3 +369,65 @@ def test_what_is_what_in_input(tmp_path):
             sorted_out(*inputs)
     with pytest.raises(libloc.DataError, match="there is no cam1 in it"):
         sorted_out(kalibr, cameras=(0, 1))
+
+
+def test_when_pictures_were_taken_is_asked_for(tmp_path):
+    """By the name of the option that tells it, before anything is searched."""
+    imu = tmp_path / "imu.csv"
+    imu.write_text(IMU_HEADING + "\n")
+
+    def how(path: Path, **given) -> dict:
+        out = reading.sources_of([path, imu], [0], None, reading.PictureTimes(**given))
+        return out.pictures[0][1]
+
+    def folder(name: str, *pictures: str) -> Path:
+        for picture in pictures:
+            (tmp_path / name).mkdir(exist_ok=True)
+            (tmp_path / name / picture).write_text("x")
+        return tmp_path / name
+
+    numbered = folder("numbered", *(f"{i:04}.png" for i in range(30)))
+    worded = folder("worded", "left_01.png", "left_02.png")
+    micro = folder("micro", *(f"{START_NS // 1000 + 50_000 * i}.png" for i in range(3)))
+    nano = folder("nano", *(f"{START_NS + 50_000_000 * i}.png" for i in range(3)))
+    assert how(nano) == {"name_unit": "ns"}
+    assert how(micro, name_unit="us") == {"name_unit": "us"}
+    assert how(numbered, rate_hz=20) == how(worded, rate_hz=20) == {"rate_hz": 20}
+    assert how(worded, rate_hz=20, start_time_ns=5) == {"rate_hz": 20, "start_time_ns": 5}
+    for path, what in (
+        (numbered, "0000.png to 0029.png are no times in nanoseconds"),
+        (worded, "left_01.png is no time in nanoseconds"),
+        (micro, "are no times in nanoseconds"),
+    ):
+        with pytest.raises(libloc.DataError, match=f"{path}: .*{what}: give --rate-hz for .*--name-unit for"):
+            how(path)
+    with pytest.raises(libloc.DataError, match="--start-time is of pictures with --rate-hz"):
+        how(numbered, start_time_ns=5)
+    listed = folder("listed", "1.png")
+    (listed / "data.csv").write_text("x")
+    euroc = tmp_path / "run"
+    (euroc / "mav0").mkdir(parents=True)
+    for path in (listed, euroc):
+        with pytest.raises(libloc.DataError, match=f"{path}: has times of its own, --rate-hz is for other"):
+            how(path, rate_hz=20)
+    corners = table(tmp_path / "corners.csv")
+    with pytest.raises(libloc.DataError, match=r"corners.csv: has times of its own, --name-unit is for pict"):
+        reading.sources_of([corners, imu], [0], None, reading.PictureTimes(name_unit="us"))
+    with pytest.raises(SystemExit) as usage:
+        calibrate.main(["camera-imu", str(nano), *BOARD, "--name-unit", "us", "--rate-hz", "5"])
+    assert usage.value.code == 2
+
+
+@needs_vision
+def test_a_folder_that_begins_with_another_size(tmp_path):
+    """A source of files goes by its first picture: the hint says so."""
+    for i, size in enumerate(((60, 40), (384, 240), (384, 240))):
+        Image.new("L", size).save(tmp_path / f"{START_NS + i * 10**8}.png")
+    source = (tmp_path, {"name_unit": "ns"})
+    with pytest.raises(
+        libloc.DataError,
+        match=r"1 picture of 60 x 40 pixels; cam0 of the rig has 384 x 240: .*2 more have another size",
+    ):
+        reading.find_views(
+            libloc.CalibrationTarget("checkerboard 9x6 0.06"), source, a_camera("cam0", 0.6), 1, {}
+        )

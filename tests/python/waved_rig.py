@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 import libloc
 
 START_NS = 1_700_000_000_000_000_000
+IMU_HEADING = "time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
 
 
 def a_camera(name: str = "cam0", scale: float = 1.0) -> libloc.CameraCalibration:
@@ -153,3 +155,25 @@ class Waved:
                 (found.time_offset_s - self.time_offset_s) / quality.time_offset_sigma_s,
             ]
         )
+
+
+def imu_rows(rig: Waved, unit: float = 1.0) -> list[str]:
+    """Lines of a CSV; unit: of the turn rates, so many in a rad/s."""
+    readings = np.hstack([rig.angular_velocity * unit, rig.specific_force]).tolist()
+    return [f"{t}," + ",".join(map(repr, row)) for t, row in zip(rig.imu_times_ns, readings, strict=True)]
+
+
+def write_imu(path: Path, rig: Waved, heading: str = IMU_HEADING, unit: float = 1.0) -> Path:
+    path.write_text("\n".join([heading, *imu_rows(rig, unit)]) + "\n")
+    return path
+
+
+def write_corners(path: Path, rig: Waved, camera: int = 0) -> Path:
+    lines = ["timestamp_ns,corner_id,u_px,v_px"]
+    for view in rig.views(camera):
+        lines += [
+            f"{view.time_ns},{i},{u!r},{v!r}"
+            for i, (u, v) in zip(view.ids, view.pixels_px.tolist(), strict=True)
+        ]
+    path.write_text("\n".join(lines) + "\n")
+    return path

@@ -2,8 +2,9 @@
 
 INPUT: a recording of a calibration target before which the rig was waved (or that was waved before the rig):
 an EuRoC folder, a dataset folder of Kalibr (cam0/NANOSECONDS.png, imu0.csv), an LCM log; or a folder of
-pictures named by their nanoseconds, or a video, with the IMU's CSV behind it; or tables of corners (CSV:
-timestamp_ns, tag_id and corner_index or corner_id, u_px, v_px), one for each camera, with the IMU's CSV.
+pictures, or a video, with the IMU's CSV behind it; or tables of corners (CSV: timestamp_ns, tag_id and
+corner_index or corner_id, u_px, v_px), one for each camera, with the IMU's CSV. Pictures are named by their
+nanoseconds (by other times: --name-unit), have a data.csv, or are numbered (--rate-hz).
 30 to 60 seconds: turn the rig briskly about all three axes and move it, the target sharp and mostly in view.
 Not still, and not slowly: what does not turn tells nothing. Any offset between the clocks is found.
 
@@ -34,9 +35,9 @@ from libloc import DataError, Verdict
 from libloc.programs import calibrate_camera_imu_input as reading
 from libloc.programs import calibrate_camera_imu_live as live
 from libloc.programs import calibrate_plots_camera_imu as plots
-from libloc.programs.arguments import count, positive
+from libloc.programs.arguments import count, positive, seconds_ns
 from libloc.programs.calibrate_camera import parse_target
-from libloc.programs.calibrate_camera_imu_input import CameraImuInput
+from libloc.programs.calibrate_camera_imu_input import CameraImuInput, PictureTimes
 from libloc.programs.calibrate_camera_imu_text import facts_of, tables_of
 from libloc.programs.calibrate_input import InputOptions
 from libloc.programs.calibrate_report import Outcome
@@ -51,7 +52,11 @@ _SEVERITIES = {
     Verdict.WARN: "warning",
     Verdict.REFUSED: "error",
 }
-
+# Options that tell how to read files; where they were not given they are None, --step is 1.
+_OF_INPUT = (
+    *("imu", "step", "name_unit", "rate_hz", "start_time"),
+    *("time_unit", "gyroscope_unit", "accelerometer_unit"),
+)
 _QUICK_LIMIT_S = 20.0  # of a solution while more is collected
 
 
@@ -84,8 +89,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--name-unit",
         choices=("ns", "us", "ms", "s"),
-        default="ns",
-        help="of pictures that are named by their times (%(default)s)",
+        help="of pictures that are named by their times (default: ns)",
+    )
+    group.add_argument(
+        "--rate-hz",
+        type=positive,
+        metavar="HZ",
+        help="of numbered pictures, or of a video in place of its own times",
+    )
+    group.add_argument(
+        "--start-time",
+        type=seconds_ns,
+        metavar="S",
+        help="of the first picture with --rate-hz, or of a video, on the IMU's clock (default: 0, or that of "
+        "the first IMU sample where the IMU counts from elsewhere)",
     )
     for name, choices in (
         ("time", ("ns", "us", "ms", "s")),
@@ -131,8 +148,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def check_options(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
     if options.live == bool(options.input):
         parser.error("INPUT or --live, one of them")
+    if options.name_unit and options.rate_hz:
+        parser.error("--name-unit, --rate-hz: only one of them tells the times of pictures")
     if options.live and (len(options.camera) > 1 or not options.rig):
         parser.error("--live is for one camera, and needs its intrinsics (--rig)")
+    for name in _OF_INPUT if options.live else ():
+        if getattr(options, name) not in (None, 1):
+            parser.error(f"--{name.replace('_', '-')} is for INPUT, not for --live")
     options.target = parse_target(parser, options.target)
     if min(options.camera) < 0 or len(set(options.camera)) < len(options.camera):
         parser.error(f"--camera {' '.join(map(str, options.camera))}: each camera once, counted from 0")
@@ -405,7 +427,7 @@ def _read(options: argparse.Namespace) -> CameraImuInput:
             gyroscope_unit=options.gyroscope_unit,
             accelerometer_unit=options.accelerometer_unit,
         ),
-        options.name_unit,
+        PictureTimes(options.name_unit, options.rate_hz, options.start_time),
         options.step,
     )
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import sys
 import time
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
@@ -23,6 +24,10 @@ from libloc.programs import calibrate_input
 from libloc.programs.calibrate_images import Progress, other_target, read_corner_table
 from libloc.programs.calibrate_input import COUNTS, SI, InputOptions, same_times
 
+_SHORTEST_NS = 100_000  # from one picture to the next: names that are closer are numbers, or in another unit
+_FAR_NS = 3_600_000_000_000  # from 0 to the first IMU sample: they count from different moments
+_ENOUGH_OF_OTHER_SIZE = 50  # pictures at the begin, to take all for such
+
 
 @dataclass
 class CameraInput:
@@ -33,6 +38,8 @@ class CameraInput:
     left_out: int = 0  # corners that were not sharp enough
     reasons: dict[str, int] = field(default_factory=dict)  # why there were no corners
     damaged: list[str] = field(default_factory=list)  # a sentence for each picture that could not be read
+    # How many had another size (width, height) than the camera [px].
+    other_sizes: Counter[tuple[int, int]] = field(default_factory=Counter)
 
 
 @dataclass
@@ -56,6 +63,29 @@ class CameraImuInput:
 
 
 @dataclass
+class PictureTimes:
+    """What was asked for about the times of pictures; nothing: their names are nanoseconds."""
+
+    name_unit: str | None = None  # ns, us, ms, s
+    rate_hz: float | None = None  # of numbered pictures, or of a video in place of its own times
+    start_time_ns: int | None = None  # of the first picture then, and of a video
+
+    def asked(self) -> str:
+        """An option that was given, or nothing."""
+        given = {
+            "--rate-hz": self.rate_hz,
+            "--name-unit": self.name_unit,
+            "--start-time": self.start_time_ns,
+        }
+        return next((name for name, value in given.items() if value is not None), "")
+
+    def at_rate(self) -> dict[str, Any]:
+        """As open_pictures() takes it, without what was not given."""
+        how = {"rate_hz": self.rate_hz, "start_time_ns": self.start_time_ns}
+        return {name: value for name, value in how.items() if value is not None}
+
+
+@dataclass
 class Sources:
     """INPUT, sorted by what it is."""
 
@@ -73,7 +103,7 @@ def _is_corner_table(path: Path) -> bool:
     return bool(names & {"u_px", "v_px", "corner_id", "corner_index"})
 
 
-def _kalibr_folder(folder: Path, cameras: list[int]) -> Sources | None:
+def _kalibr_folder(folder: Path, cameras: list[int], times: PictureTimes) -> Sources | None:
     """Kalibr's dataset: cam0/NANOSECONDS.png … and imu0.csv."""
     if (folder / "mav0").is_dir() or not (folder / "cam0").is_dir() or (folder / "cam0" / "data").is_dir():
         return None
@@ -82,23 +112,57 @@ def _kalibr_folder(folder: Path, cameras: list[int]) -> Sources | None:
         own = folder / f"cam{camera}"
         if not own.is_dir():
             raise DataError(f"{folder}: there is no cam{camera} in it")
-        out.pictures.append((own, {"name_unit": "ns"}))
+        out.pictures.append((own, _by_names(own, times)))
     return out
 
 
-def _times_of(folder: Path, name_unit: str) -> tuple[Path, dict[str, Any]]:
+def _by_names(folder: Path, times: PictureTimes) -> dict[str, Any]:
+    """How the names of its pictures tell their times. Raises DataError when nobody said how they do."""
+    if times.rate_hz:
+        return times.at_rate()
+    if times.start_time_ns is not None:
+        raise DataError(f"{folder}: --start-time is of pictures with --rate-hz, or of a video")
+    if times.name_unit:
+        return {"name_unit": times.name_unit}
+    names = sorted(path.name for path in folder.iterdir() if path.suffix.lower() in PICTURES)
+    stems = [Path(name).stem for name in names]
+    no_time = next((name for name, stem in zip(names, stems, strict=True) if not stem.isdecimal()), None)
+    why = f"{no_time} is no time in nanoseconds" if no_time else ""
+    if len(stems) > 1 and not why:
+        numbers = [int(stem) for stem in stems]
+        if max(numbers) - min(numbers) < _SHORTEST_NS * (len(numbers) - 1):
+            why = f"{names[0]} to {names[-1]} are no times in nanoseconds"
+    if why:
+        raise DataError(
+            f"{folder}: when were its pictures taken? {why}: give --rate-hz for numbered pictures, "
+            "--name-unit for names that are times, or a data.csv with the time and name of each"
+        )
+    return {"name_unit": "ns"}
+
+
+def _times_of(folder: Path, times: PictureTimes) -> tuple[Path, dict[str, Any]]:
     """The folder that holds the pictures, and what tells their times (data.csv, a list, their names)."""
+    found: tuple[Path, dict[str, Any]] | None = None
     if (folder / "data").is_dir() and (folder / "data.csv").is_file():
-        return folder / "data", {"times_file": folder / "data.csv"}
-    for index in (folder / "data.csv", folder.parent / "data.csv"):
-        if index.is_file() and (index.parent == folder or folder.name == "data"):
-            return folder, {"times_file": index}
-    if any((folder / name).is_file() for name in ("rgb.txt", "times.txt")):
-        return folder, {}
-    return folder, {"name_unit": name_unit}
+        found = folder / "data", {"times_file": folder / "data.csv"}
+    elif (folder / "data.csv").is_file():
+        found = folder, {"times_file": folder / "data.csv"}
+    elif folder.name == "data" and (folder.parent / "data.csv").is_file():
+        found = folder, {"times_file": folder.parent / "data.csv"}
+    elif any((folder / name).is_file() for name in ("rgb.txt", "times.txt")):
+        found = folder, {}
+    if found is None:
+        return folder, _by_names(folder, times)
+    _need_no_times(folder, times)
+    return found
 
 
-def sources_of(inputs: list[Path], cameras: list[int], imu: Path | None, name_unit: str) -> Sources:
+def _need_no_times(path: Path, times: PictureTimes) -> None:
+    if times.asked():
+        raise DataError(f"{path}: has times of its own, {times.asked()} is for other inputs")
+
+
+def sources_of(inputs: list[Path], cameras: list[int], imu: Path | None, times: PictureTimes) -> Sources:
     """Raises DataError naming what is missing or too much."""
     out = Sources(imu=imu)
     singles: list[tuple[Path, dict[str, Any]]] = []  # folders and videos of one camera
@@ -119,14 +183,17 @@ def sources_of(inputs: list[Path], cameras: list[int], imu: Path | None, name_un
             continue
         if out.pictures:
             raise DataError(f"{path}: {out.pictures[0][0]} gives the pictures already")
-        kalibr = _kalibr_folder(path, cameras) if path.is_dir() else None
+        kalibr = _kalibr_folder(path, cameras, times) if path.is_dir() else None
         if kalibr is not None:
             out.pictures, out.folder, beside = kalibr.pictures, path, kalibr.imu
         elif form == "folder":
-            singles.append(_times_of(path, name_unit))
+            singles.append(_times_of(path, times))
         elif form == "video":
-            singles.append((path, {}))
+            if times.name_unit:
+                raise DataError(f"{path}: is a video, --name-unit is for folders of pictures")
+            singles.append((path, times.at_rate()))
         else:
+            _need_no_times(path, times)
             out.folder = path if form == "euroc" else None
             out.pictures = [(path, {"camera": camera}) for camera in cameras]
             beside = path
@@ -139,6 +206,8 @@ def sources_of(inputs: list[Path], cameras: list[int], imu: Path | None, name_un
         )
     out.pictures = out.pictures or singles
     out.imu = out.imu or beside
+    if out.tables and times.asked():
+        raise DataError(f"{out.tables[0]}: has times of its own, {times.asked()} is for pictures")
     if out.tables and out.pictures:
         raise DataError(
             f"{out.tables[0]}: corners, and {out.pictures[0][0]} gives pictures: one of them (--imu takes "
@@ -206,6 +275,17 @@ def cameras_of(rig: libloc.Rig, numbers: list[int]) -> list[libloc.CameraCalibra
     return out
 
 
+def _of_other_size(found: CameraInput) -> str:
+    """ "3 pictures of 320 x 200 pixels; cam0 of the rig has 640 x 400: ..." """
+    sizes = [f"{width} x {height}" for (width, height), _ in found.other_sizes.most_common()]
+    shown = ", ".join(sizes[:3]) + (", …" if len(sizes) > 3 else "")
+    count = found.other_sizes.total()
+    return (
+        f"{count} picture{'s' if count > 1 else ''} of {shown} pixels; {found.camera.name} of the rig has "
+        f"{found.camera.width_px} x {found.camera.height_px}: intrinsics hold for one size only"
+    )
+
+
 def find_views(
     target: libloc.CalibrationTarget,
     source: tuple[Path, dict[str, Any]],
@@ -216,7 +296,8 @@ def find_views(
 ) -> tuple[CameraInput, bool]:
     """Searches the pictures of one camera; Ctrl-C goes on with those that were searched (True).
 
-    Raises DataError when no picture shows the target, or they have another size than the camera.
+    Pictures of another size than the camera are left out and counted. Raises DataError when all of them have
+    one, or none shows the target.
     """
     if not libloc.HAS_VISION:
         raise DataError("this libloc was built without OpenCV and cannot look at pictures")
@@ -244,10 +325,10 @@ def find_views(
                 continue
             height, width = picture.shape
             if (width, height) != (camera.width_px, camera.height_px):
-                raise DataError(
-                    f"{path}: a picture of {width} x {height} pixels; {camera.name} of the rig has "
-                    f"{camera.width_px} x {camera.height_px}: intrinsics hold for one size only"
-                )
+                out.other_sizes[width, height] += 1
+                if not out.views and out.other_sizes.total() == _ENOUGH_OF_OTHER_SIZE:
+                    break
+                continue
             seen = detector.detect(picture)
             out.left_out += seen.corners_left_out
             if len(seen.view):
@@ -261,10 +342,17 @@ def find_views(
     except KeyboardInterrupt:
         interrupted = True
     progress.end()
+    if out.other_sizes and not out.views:
+        # A source of files goes by the size of its first picture.
+        others = opened.counts().get("image.skipped.other_size", 0)
+        hint = f" ({others} more have another size than the first: take that one away)" if others else ""
+        raise DataError(f"{path}: {_of_other_size(out)}{hint}")
     counts[f"{camera.name}.pictures.searched"] = len(out.views)
     counts[f"{camera.name}.pictures.with_target"] = hits
     if out.damaged:
         counts[f"{camera.name}.pictures.skipped.damaged"] = len(out.damaged)
+    if out.other_sizes:
+        counts[f"{camera.name}.pictures.skipped.other_size"] = out.other_sizes.total()
     for name, count in opened.counts().items():
         if count and ("skip" in name or "missing" in name):
             counts[f"{camera.name}.{name}"] = count
@@ -278,6 +366,26 @@ def find_views(
             f"{max(out.reasons, key=lambda r: out.reasons[r])}." + (f" {hint}" if hint else "")
         )
     return out, interrupted
+
+
+def _begin_with(imu_ns: int, sources: Sources, notes: list[str]) -> None:
+    """Pictures that are counted from 0 begin with the first IMU sample where the IMU counts from elsewhere.
+
+    The offset that is found is then no larger than what lies between the two beginnings.
+    """
+    for path, how in sources.pictures:
+        counted = "rate_hz" in how or picture_format(path) == "video"
+        if counted and "start_time_ns" not in how and abs(imu_ns) > _FAR_NS:
+            how["start_time_ns"] = imu_ns
+            notes.append(
+                f"{path.name}: the first picture was given the time of the first IMU sample (--start-time "
+                "names another): the offset of the clocks holds for this recording alone"
+            )
+        elif "rate_hz" in how:
+            notes.append(
+                f"{path.name}: the times of the pictures were counted at --rate-hz: the offset of the clocks "
+                "holds for this recording alone"
+            )
 
 
 def corrected(
@@ -332,12 +440,12 @@ def read_input(
     imu: Path | None,
     target: libloc.CalibrationTarget,
     text: InputOptions,
-    name_unit: str = "ns",
+    picture_times: PictureTimes | None = None,
     step: int = 1,
     stream: TextIO | None = None,
 ) -> CameraImuInput:
     """Reads and searches everything. Raises DataError naming file, line, field and value."""
-    sources = sources_of(inputs, cameras, imu, name_unit)
+    sources = sources_of(inputs, cameras, imu, picture_times or PictureTimes())
     rig = read_rig(rigs, sources.folder, cameras)
     calibrations = cameras_of(rig, cameras)
     notes: list[str] = []
@@ -357,6 +465,7 @@ def read_input(
             f"{sources.imu}: {len(gyro)} readings of the gyroscope and {len(accel)} of the accelerometer, "
             "not at the same times: both are needed in each line"
         )
+    _begin_with(int(times[0]), sources, notes)
     begin = time.process_time()
     found: list[CameraInput] = []
     interrupted = False
@@ -376,6 +485,8 @@ def read_input(
         notes += camera_input.damaged[:3]
         if len(camera_input.damaged) > 3:
             notes.append(f"{len(camera_input.damaged) - 3} more pictures could not be read")
+        if camera_input.other_sizes:
+            notes.append(f"left out: {_of_other_size(camera_input)}")
         if camera_input.left_out:
             notes.append(
                 f"{camera_input.left_out} corners of {camera_input.camera.name} were not sharp enough"

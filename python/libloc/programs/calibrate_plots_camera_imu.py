@@ -49,7 +49,11 @@ def pictures(
                 partial(plot_reprojection, camera),
             )
         )
-        stamps = None if recordings is None else np.array([view.time_ns for view in recordings[i].views])
+        stamps = None  # on the IMU's clock
+        if recordings is not None:
+            stamps = np.array([view.time_ns for view in recordings[i].views]) + round(
+                camera.time_offset_s * 1e9
+            )
         out.append(
             Picture(
                 f"pictures_{name}",
