@@ -1,10 +1,14 @@
 """loc-calibrate camera-imu --live: guidance by itself, and the whole against the real hub."""
 
 import os
+import re
+import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 
+import lcm
 import loc
 import numpy as np
 import pytest
@@ -16,6 +20,7 @@ from waved_rig import Waved, a_camera
 
 import libloc
 
+BOARD = ("--target", "checkerboard", "9x6", "0.06")
 needs_vision = pytest.mark.skipif(not libloc.HAS_VISION, reason="built without OpenCV")
 
 
@@ -153,12 +158,47 @@ def test_pictures_of_another_size_end_it():
     session.take(libloc.IMAGE_CHANNEL, picture.encode())
     with pytest.raises(libloc.DataError, match="320 x 200 pixels come; cam0 of the rig has 640 x 400"):
         session.finish()
-    # A damaged one is counted.
+    # A stray one among others, or a damaged one, is counted.
+    collected.views.append(libloc.TargetView(np.zeros(0, np.int64), np.zeros((0, 2)), 1))
+    session.take(libloc.IMAGE_CHANNEL, picture.encode())
+    session.finish()
     picture.data, picture.size = bytes(100), 100
     session.take(libloc.IMAGE_CHANNEL, picture.encode())
     session.finish()
     session.close()
+    assert collected.counts["images.skipped.other_size"] == 1
     assert collected.counts["images.skipped.damaged"] == 1
+    assert collected.skipped() == 2
+
+
+def test_rates_are_those_of_the_last_seconds():
+    rates = live.Rates()
+    counts: Counter[str] = Counter()
+    assert rates.add(10, counts) == (0, 0)
+    for second in range(1, 9):
+        counts["images.received"] += 20 if second <= 4 else 0
+        counts["imu.received"] += 200
+        found = rates.add(10 + second, counts)
+        assert found[0] == pytest.approx({5: 40 / 3, 6: 20 / 3}.get(second, 20 if second < 5 else 0))
+        assert found[1] == pytest.approx(200)
+
+
+def test_turning_is_that_of_all_samples():
+    """Summed up as they come, without what is no number."""
+    collected = live.Collected(Waved(seconds=0.1).target, a_camera())
+    assert not np.any(collected.turning())
+    rates = np.random.default_rng(4).normal([0.5, 0, -2], [1, 0.2, 0.5], (500, 3))
+    for i, rate in enumerate(rates):
+        collected.add_imu(i, list(rate), [0, 0, 9.8])
+    collected.add_imu(500, [0.1, np.nan, 0], [0, 0, 9.8])
+    spread, weakest = collected.turning()
+    np.testing.assert_allclose(spread, rates.std(axis=0), rtol=1e-9)
+    values, axes = np.linalg.eigh(np.cov(rates.T, ddof=0))
+    assert np.linalg.norm(weakest) == pytest.approx(np.sqrt(values[0]))
+    assert abs(weakest @ axes[:, 0]) == pytest.approx(np.linalg.norm(weakest))
+    times, some = collected.some_rates(100)
+    assert times.tolist() == list(range(0, 501, 5))
+    np.testing.assert_array_equal(some[:100], rates[::5])
 
 
 def test_no_imu_sample_waits_for_a_slow_detector():
@@ -211,59 +251,77 @@ def start(url: str, *arguments) -> subprocess.Popen:
         stderr=subprocess.PIPE,
         text=True,
         env=os.environ | {"PYTHONUNBUFFERED": "1"},
+        # A test run in the background ignores Ctrl-C, and children inherit that.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
+
+
+class Played:
+    """A rig whose messages are sent eight times as fast as they came."""
+
+    def __init__(self, seconds: float, turning: tuple[float, float, float] = (0.5, 0.5, 0.9)) -> None:
+        self.rig = Waved(
+            seconds=seconds,
+            camera_hz=8,
+            distance=1.1,
+            turning=turning,
+            seed=3,
+            cameras=[a_camera("cam0", 0.6)],
+        )
+        rig, pictures = self.rig, self.rig.renderings()
+        self._messages: list[tuple[int, str, bytes]] = []
+        for i, t in enumerate(rig.imu_times_ns.tolist()):
+            m = loc.imu_t()
+            m.time_ns, m.host_time_ns, m.sequence = t, t, i
+            m.angular_velocity, m.specific_force = list(rig.angular_velocity[i]), list(rig.specific_force[i])
+            self._messages.append((t, libloc.IMU_CHANNEL, m.encode()))
+        for i, t in enumerate(rig.picture_times()[1].tolist()):
+            p = loc.image_t()
+            p.time_ns, p.host_time_ns, p.sequence, p.camera = t, t, i, 0
+            p.height, p.width = pictures[i].shape
+            p.row_stride, p.pixelformat = p.width, p.PIXEL_FORMAT_GRAY
+            p.data = pictures[i].tobytes()
+            p.size = len(p.data)
+            self._messages.append((t, libloc.IMAGE_CHANNEL, p.encode()))
+        self._messages.sort()
+
+    def send(self, url: str, process: subprocess.Popen, end: str = "") -> None:
+        """As long as it listens."""
+        sender = lcm.LCM(url)
+        begin = time.monotonic()
+        for t, channel, data in self._messages:
+            at = begin + (t - self._messages[0][0]) * 1e-9 / 8
+            time.sleep(max(0.0, at - time.monotonic()))
+            sender.publish(channel, data)
+            if channel == libloc.IMAGE_CHANNEL and process.poll() is not None:
+                return
+        if end:
+            status = loc.source_status_t()
+            status.state, status.message = status.STATE_ENDED, end
+            sender.publish(libloc.SOURCE_STATUS_CHANNEL, status.encode())
+
+
+@pytest.fixture(scope="module")
+def played() -> Played:
+    return Played(11)
 
 
 @needs_vision
-def test_the_whole_over_lcm_and_again_from_what_was_kept(tmp_path, capsys):
-    import lcm
-
-    rig = Waved(
-        seconds=11,
-        camera_hz=8,
-        distance=1.1,
-        turning=(0.5, 0.5, 0.9),
-        seed=3,
-        cameras=[a_camera("cam0", 0.6)],
-    )
+def test_the_whole_over_lcm_and_again_from_what_was_kept(played, tmp_path, capsys):
+    rig = played.rig
     libloc.write_rig(tmp_path / "rig.yaml", rig.rig())
-    events = [(int(t), "imu", i) for i, t in enumerate(rig.imu_times_ns)]
-    events += [(int(t), "image", i) for i, t in enumerate(rig.picture_times()[1])]
-    pictures = rig.renderings()
-    board = ("--target", "checkerboard", "9x6", "0.06")
     with hub() as url:
         process = start(
-            url, *board, "--rig", tmp_path / "rig.yaml", "--out", tmp_path / "out.yaml", "--report", tmp_path
+            url, *BOARD, "--rig", tmp_path / "rig.yaml", "--out", tmp_path / "out.yaml", "--report", tmp_path
         )
         wait_for(process, "target in 0 of 0")  # it listens
-        sender = lcm.LCM(url)
-        begin = time.monotonic()
-        for t, kind, i in sorted(events):
-            at = begin + (t - rig.imu_times_ns[0]) * 1e-9 / 4  # four times as fast as it was
-            time.sleep(max(0.0, at - time.monotonic()))
-            if kind == "imu":
-                m = loc.imu_t()
-                m.time_ns, m.host_time_ns, m.sequence = t, t, i
-                m.angular_velocity, m.specific_force = (
-                    list(rig.angular_velocity[i]),
-                    list(rig.specific_force[i]),
-                )
-                sender.publish(libloc.IMU_CHANNEL, m.encode())
-            else:
-                p = loc.image_t()
-                p.time_ns, p.host_time_ns, p.sequence, p.camera = t, t, i, 0
-                p.height, p.width = pictures[i].shape
-                p.row_stride, p.pixelformat = p.width, p.PIXEL_FORMAT_GRAY
-                p.data = pictures[i].tobytes()
-                p.size = len(p.data)
-                sender.publish(libloc.IMAGE_CHANNEL, p.encode())
-        end = loc.source_status_t()
-        end.state, end.message = end.STATE_ENDED, "the recording has ended"
-        sender.publish(libloc.SOURCE_STATUS_CHANNEL, end.encode())
+        played.send(url, process, "the recording has ended")
         out, progress = process.communicate(timeout=60)
     assert process.returncode == 0, out + progress
     assert "the recording has ended" in progress
     assert "% of the image" in progress
+    assert re.search(r"camera [1-9]\d* Hz, IMU [1-9]\d+ Hz", progress)
+    assert re.search(r"pictures, \d+ skipped", progress)
     (found,) = libloc.read_rig(tmp_path / "out.yaml").cameras
     assert np.abs(rig.off_by_sigmas(found)).max() < 5
     for name in ("progress.png", "report.html", "corners.csv", "imu.csv"):
@@ -272,7 +330,7 @@ def test_the_whole_over_lcm_and_again_from_what_was_kept(tmp_path, capsys):
         [
             "camera-imu",
             *(str(tmp_path / name) for name in ("corners.csv", "imu.csv")),
-            *board,
+            *BOARD,
             *("--rig", str(tmp_path / "rig.yaml"), "--out", str(tmp_path / "again.yaml")),
         ]
     )
@@ -282,16 +340,63 @@ def test_the_whole_over_lcm_and_again_from_what_was_kept(tmp_path, capsys):
     capsys.readouterr()
 
 
-def test_silence_is_named(tmp_path):
+@needs_vision
+@pytest.mark.parametrize("ctrl_c", [True, False])
+def test_what_came_is_used_when_it_is_interrupted_or_the_time_is_over(played, tmp_path, ctrl_c):
+    rig = played.rig
+    libloc.write_rig(tmp_path / "rig.yaml", rig.rig())
+    with hub() as url:
+        process = start(
+            url,
+            *(*BOARD, "--rig", tmp_path / "rig.yaml", "--out", tmp_path / "out.yaml"),
+            *("--patience", 100, "--duration", 100 if ctrl_c else 3),
+        )
+        wait_for(process, "target in 0 of 0")
+        played.send(url, process)
+        if ctrl_c:
+            # With a camera of 0 Hz: all that was sent has come.
+            wait_for(process, "camera 0 Hz, IMU 0 Hz")
+            process.send_signal(signal.SIGINT)
+        out, progress = process.communicate(timeout=60)
+    assert process.returncode == 0, out + progress
+    assert "Traceback" not in progress
+    why = "interrupted" if ctrl_c else "the time given with --duration is over"
+    assert f"collecting ended: {why}" in progress
+    (found,) = libloc.read_rig(tmp_path / "out.yaml").cameras
+    assert np.abs(rig.off_by_sigmas(found)).max() < 5
+
+
+@needs_vision
+def test_it_ends_when_it_knows_enough(tmp_path):
+    played = Played(36, (0.8, 0.8, 1.2))
+    libloc.write_rig(tmp_path / "rig.yaml", played.rig.rig())
+    with hub() as url:
+        process = start(url, *BOARD, "--rig", tmp_path / "rig.yaml")
+        first = wait_for(process, "target in 0 of 0")
+        played.send(url, process)
+        out, progress = process.communicate(timeout=60)
+    assert process.returncode == 0, out + progress
+    assert "collecting ended: enough now" in progress
+    assert "not solved yet" in first[-1]
+    assert "known to" in progress
+    assert "No rig file was named with --out" in out
+
+
+def test_silence_is_named(tmp_path, capsys):
     rig = Waved(seconds=1)
     libloc.write_rig(tmp_path / "rig.yaml", rig.rig())
-    board = ("--target", "checkerboard", "9x6", "0.06", "--rig", tmp_path / "rig.yaml")
     with hub() as url:
-        process = start(url, *board, "--patience", 1)
+        process = start(url, *BOARD, "--rig", tmp_path / "rig.yaml", "--patience", 1)
         out, progress = process.communicate(timeout=30)
     assert process.returncode == 1, out
     assert f"nothing came on {libloc.IMAGE_CHANNEL}" in progress
     assert "loc-driver" in progress
     with pytest.raises(SystemExit) as usage:
-        calibrate.main(["camera-imu", "--live", *map(str, board[:4])])
+        calibrate.main(["camera-imu", "--live", *BOARD])
     assert usage.value.code == 2
+    with pytest.raises(SystemExit) as usage:
+        calibrate.main(
+            ["camera-imu", "--live", *BOARD, "--rig", str(tmp_path / "rig.yaml"), "--rate-hz", "5"]
+        )
+    assert usage.value.code == 2
+    assert "--rate-hz is for INPUT" in capsys.readouterr().err

@@ -11,7 +11,7 @@ import argparse
 import queue
 import sys
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -40,6 +40,7 @@ _LEAST_S = 20.0  # of data, before it is enough
 _LEAST_TURNING = 0.15  # rms of the turn rate along the weakest axis [rad/s]
 _LEAST_COVERAGE = 0.4  # of the cells
 _LEAST_SEEN = 0.5  # of the pictures
+_RATES_S = 3.0  # over which samples a second are counted
 _LATEST_S, _SLOW = 3.0, 0.15  # rms of the turn rate of the last seconds [rad/s]
 _UNSEEN = 8  # pictures in a row
 _ABOUT = (
@@ -68,7 +69,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 class OtherSizeError(DataError):
-    """A picture that the camera's intrinsics do not hold for: no use in going on."""
+    """A picture that the camera's intrinsics do not hold for. Where the first is one, all are."""
 
 
 @dataclass
@@ -94,6 +95,9 @@ class Collected:
     _seen_ns: list[int] = field(default_factory=list)  # first and last with the target
     _times: list[int] = field(default_factory=list)
     _rows: list[tuple[float, ...]] = field(default_factory=list)
+    _rates: int = 0  # turn rates that are finite: how many, their sum, and that of their products
+    _sum: Array = field(default_factory=lambda: np.zeros(3))
+    _products: Array = field(default_factory=lambda: np.zeros((3, 3)))
     _sequence: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -109,6 +113,11 @@ class Collected:
     def add_imu(self, time_ns: int, angular_velocity: list[float], specific_force: list[float]) -> None:
         self._times.append(time_ns)
         self._rows.append((*angular_velocity, *specific_force))
+        rate = np.array(angular_velocity)
+        if np.isfinite(rate).all():
+            self._rates += 1
+            self._sum += rate
+            self._products += np.outer(rate, rate)
 
     def add_detection(self, time_ns: int, seen: libloc.TargetDetection) -> None:
         self.counts["images.searched"] += 1
@@ -140,6 +149,12 @@ class Collected:
     def specific_force(self) -> Array:
         return np.ascontiguousarray(np.array(self._rows, dtype=float).reshape(-1, 6)[:, 3:])
 
+    def some_rates(self, count: int) -> tuple[NDArray[np.int64], Array]:
+        """Times and turn rates of about so many samples, for a plot."""
+        step = max(1, len(self._times) // count)
+        rates = np.array([row[:3] for row in self._rows[::step]], dtype=float).reshape(-1, 3)
+        return np.array(self._times[::step], dtype=np.int64), rates
+
     def seconds(self) -> float:
         """Of pictures that show the target, from the first to the last."""
         return (self._seen_ns[-1] - self._seen_ns[0]) * 1e-9 if self._seen_ns else 0.0
@@ -155,12 +170,19 @@ class Collected:
 
     def turning(self) -> tuple[Array, Array]:
         """Deviations of the turn rate [rad/s] about the IMU's axes, and the axis with the least."""
-        rates = self.angular_velocity
-        rates = rates[np.isfinite(rates).all(axis=1)]
-        if len(rates) < 2:
+        if self._rates < 2:
             return np.zeros(3), np.zeros(3)
-        values, vectors = np.linalg.eigh(np.cov(rates.T))
-        return rates.std(axis=0), vectors[:, 0] * np.sqrt(max(values[0], 0.0))
+        mean = self._sum / self._rates
+        covariance = self._products / self._rates - np.outer(mean, mean)
+        values, vectors = np.linalg.eigh(covariance)
+        return (
+            np.sqrt(np.maximum(np.diag(covariance), 0.0)),
+            vectors[:, 0] * np.sqrt(max(values[0], 0.0)),
+        )
+
+    def skipped(self) -> int:
+        """Pictures of the camera that came and were not searched."""
+        return sum(count for name, count in self.counts.items() if name.startswith("images.skipped."))
 
     def coverage(self) -> float:
         return float((self.cells > 0).mean())
@@ -237,22 +259,41 @@ def is_small(fit: libloc.CameraImuFit) -> bool:
     return turn < _ENOUGH_DEG and shift < _ENOUGH_MM and offset < _ENOUGH_MS
 
 
+class Rates:
+    """How many pictures and IMU samples come in a second, on the computer's clock."""
+
+    def __init__(self) -> None:
+        self._seen: deque[tuple[float, int, int]] = deque()
+
+    def add(self, now_s: float, counts: Counter[str]) -> tuple[float, float]:
+        """The rates [Hz] over the last seconds; zero at the first call."""
+        self._seen.append((now_s, counts["images.received"], counts["imu.received"]))
+        while len(self._seen) > 2 and now_s - self._seen[1][0] >= _RATES_S:
+            self._seen.popleft()
+        since, images, imu = self._seen[0]
+        elapsed = max(now_s - since, 1e-3)
+        return (self._seen[-1][1] - images) / elapsed, (self._seen[-1][2] - imu) / elapsed
+
+
 class _Display:
     """One line a second; on a terminal the image's cells that are drawn over and over."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
+        self._rates = Rates()
         self._terminal = stream.isatty()
         self._height = 0
 
     def show(self, collected: Collected, fit: libloc.CameraImuFit | None, advice: Advice) -> None:
         spread, weakest = collected.turning()
+        camera_hz, imu_hz = self._rates.add(time.monotonic(), collected.counts)
         known = "not solved yet"
         if fit is not None:
             known = "known to {:.2g} deg, {:.2g} mm, {:.2g} ms".format(*deviations(fit))
         head = (
-            f"{collected.seconds():4.0f} s  target in {collected.counts['images.with_target']} of "
-            f"{collected.counts['images.searched']} pictures  turning {' '.join(f'{x:.2f}' for x in spread)} "
+            f"{collected.seconds():4.0f} s  camera {camera_hz:.0f} Hz, IMU {imu_hz:.0f} Hz  "
+            f"target in {collected.counts['images.with_target']} of {collected.counts['images.searched']} "
+            f"pictures, {collected.skipped()} skipped  turning {' '.join(f'{x:.2f}' for x in spread)} "
             f"(least {np.linalg.norm(weakest):.2f}) rad/s  {100 * collected.coverage():.0f} % of the image  "
             f"{known}"
         )
@@ -282,12 +323,10 @@ def plot_progress(collected: Collected, advice: Advice) -> Figure:
     )
     figure.colorbar(shown, ax=left, label="corners [powers of ten]", shrink=0.7)
     left.set(title="where corners were seen", xlabel="u [px]", ylabel="v [px]")
-    times, rates = collected.imu_times_ns, collected.angular_velocity
+    times, rates = collected.some_rates(3000)
     if len(times):
-        step = max(1, len(times) // 3000)
-        seconds = (times - times[0])[::step] * 1e-9
         for i, axis in enumerate("xyz"):
-            right.plot(seconds, rates[::step, i], label=axis, linewidth=0.8)
+            right.plot((times - times[0]) * 1e-9, rates[:, i], label=axis, linewidth=0.8)
         right.legend(loc="upper right")
     right.set(title="turn rate", xlabel="time [s]", ylabel="rad/s")
     figure.suptitle(advice.text)
@@ -383,7 +422,9 @@ class _Session:
             try:
                 collected.add_detection(time_ns, found.result())
             except OtherSizeError:
-                raise
+                if not collected.views:
+                    raise
+                collected.counts["images.skipped.other_size"] += 1
             except DataError:
                 collected.counts["images.skipped.damaged"] += 1
         if self._detection is None and self._waiting is not None:
@@ -463,7 +504,7 @@ def collect(
     session = _Session(options, collected, _detector(target, camera), solve)
     display = _Display(stream)
     start = time.monotonic()
-    next_line, next_picture = start + _LINE_S, start + _PICTURE_S
+    next_line, next_picture = start, start + _PICTURE_S
     why = "the time given with --duration is over"
     # A queue, so that drawing loses none.
     messages: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
