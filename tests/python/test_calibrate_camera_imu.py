@@ -343,6 +343,7 @@ def test_real_recording(tmp_path, capsys):
     )
     assert "Usable: where cam0 sits" in text
     assert "the rig says nothing of the IMU's noise" in text
+    assert "nobody has measured" not in text  # the same again
     (found,) = libloc.read_rig(path).cameras
     euroc = [-0.0216401454975, -0.064676986768, 0.00981073058949]
     basalt = [-0.01677, -0.06894, 0.00514]

@@ -326,7 +326,9 @@ def test_what_is_what_in_input(tmp_path):
         path.write_text(text)
         return path
 
-    def sorted_out(*inputs: Path, cameras: tuple[int, ...] = (0,), imu: Path | None = None, unit: str | None = None):
+    def sorted_out(
+        *inputs: Path, cameras: tuple[int, ...] = (0,), imu: Path | None = None, unit: str | None = None
+    ):
         out = reading.sources_of(list(inputs), list(cameras), imu, reading.PictureTimes(name_unit=unit))
         return out.pictures, out.tables, out.imu
 

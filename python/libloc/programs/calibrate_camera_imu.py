@@ -221,6 +221,8 @@ def _lint(data: CameraImuInput, options: argparse.Namespace) -> list[libloc.Came
         data.noise,
         data.rate_hz,
     )
+    if not data.noise_known:  # of which there is a note already
+        findings = [f for f in findings if f.code != "noise.default"]
     if options.step > 1:  # fewer pictures a second than the rig says is what was asked for
         findings = [f for f in findings if f.code != "camera.rate_not_nominal"]
     if data.as_read is not None and not any(f.code == "imu.saturated" for f in findings):
@@ -287,6 +289,7 @@ def _apply(
 
 
 def write_camchain(path: Path, fit: libloc.CameraImuFit) -> None:
+    """Kalibr's file, with the cameras of this calibration alone."""
     rig = libloc.Rig()
     rig.cameras = [camera.camera for camera in fit.cameras]
     libloc.write_kalibr_camchain(path, rig)
@@ -298,14 +301,11 @@ def outcome_of(
     options: argparse.Namespace,
     findings: list[libloc.CameraImuFinding],
 ) -> Outcome:
+    """What is said, drawn and written of a solution."""
     verdict, reasons = _judged(fit, findings)
     names = [camera.camera.name for camera in fit.cameras]
     notes = [f.text for f in findings if f.severity in (Verdict.OK, Verdict.FAIR)] + data.notes
-    for camera in data.cameras:
-        reasons_of = sorted(camera.reasons.items(), key=lambda item: -item[1])
-        notes += [
-            f"{camera.camera.name}: no target in {count} pictures: {reason}" for reason, count in reasons_of
-        ]
+    notes += [note for camera in data.cameras for note in camera.notes()]
     if fit.stopped:
         notes.append(f"the solution was stopped ({fit.stopped}): this is the best so far")
     return Outcome(
@@ -408,6 +408,7 @@ def _collect(options: argparse.Namespace) -> CameraImuInput:
         angular_velocity=rates,
         specific_force=forces,
         noise=noise,
+        noise_known=rig.imu is not None,
         rate_hz=rig.imu.rate_hz if rig.imu is not None else 0.0,
         counts=dict(found.counts),
         notes=notes,
@@ -437,5 +438,5 @@ def calibrate(options: argparse.Namespace) -> Outcome:
     begin = time.monotonic()
     data = _collect(options) if options.live else _read(options)
     outcome = solve(data, options)
-    outcome.facts.append(("time", f"{time.monotonic() - begin:.1f} s in all"))
+    outcome.facts.append(("time", f"{time.monotonic() - begin:.1f} s until this result"))
     return outcome

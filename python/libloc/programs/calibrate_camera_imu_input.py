@@ -41,20 +41,36 @@ class CameraInput:
     # How many had another size (width, height) than the camera [px].
     other_sizes: Counter[tuple[int, int]] = field(default_factory=Counter)
 
+    def notes(self) -> list[str]:
+        """What was left out, and why."""
+        out = self.damaged[:3]
+        if len(self.damaged) > 3:
+            out.append(f"{len(self.damaged) - 3} more pictures could not be read")
+        if self.other_sizes:
+            out.append(f"left out: {_of_other_size(self)}")
+        if self.left_out:
+            out.append(f"{self.left_out} corners of {self.camera.name} were not sharp enough")
+        return out + [
+            f"{self.camera.name}: no target in {count} pictures: {reason}"
+            for reason, count in sorted(self.reasons.items(), key=lambda item: -item[1])
+        ]
+
 
 @dataclass
 class CameraImuInput:
+    """All that is calibrated from, whether it was read or came live."""
+
     name: str
     cameras: list[CameraInput]
     times_ns: NDArray[np.int64]
     angular_velocity: NDArray[np.float64]  # (N, 3) [rad/s], corrected by the rig
     specific_force: NDArray[np.float64]  # (N, 3) [m/s²], likewise
     noise: libloc.ImuNoise
+    noise_known: bool = True  # by the rig
     rate_hz: float = 0.0  # nominal; 0: unknown
     counts: dict[str, int] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     detect_cpu_s: float = 0.0
-    interrupted: bool = False
     # Rates and forces as read, where the rig has corrected them: a sensor's limit shows in these only.
     as_read: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
@@ -424,6 +440,7 @@ def _read_imu(path: Path, options: InputOptions, notes: list[str]) -> calibrate_
 
 
 def noise_of(rig: libloc.Rig, notes: list[str]) -> libloc.ImuNoise:
+    """That of the rig; without one the usual noise, and a note that says so."""
     if rig.imu is None:
         notes.append(
             "the rig says nothing of the IMU's noise: that of a usual MEMS IMU was taken "
@@ -481,16 +498,6 @@ def read_input(
             interrupted = interrupted or stopped
     if interrupted:
         notes.append("interrupted: the rest of the pictures was not searched")
-    for camera_input in found:
-        notes += camera_input.damaged[:3]
-        if len(camera_input.damaged) > 3:
-            notes.append(f"{len(camera_input.damaged) - 3} more pictures could not be read")
-        if camera_input.other_sizes:
-            notes.append(f"left out: {_of_other_size(camera_input)}")
-        if camera_input.left_out:
-            notes.append(
-                f"{camera_input.left_out} corners of {camera_input.camera.name} were not sharp enough"
-            )
     # Of a log, what concerns other streams is left away.
     own = ("imu.", "rows.", "gyroscope.", "accelerometer.")
     counts |= {
@@ -507,9 +514,9 @@ def read_input(
         if rig.imu is None
         else (np.ascontiguousarray(gyro.rows), np.ascontiguousarray(accel.rows)),
         noise=noise_of(rig, notes),
+        noise_known=rig.imu is not None,
         rate_hz=rig.imu.rate_hz if rig.imu is not None else 0.0,
         counts=counts,
         notes=notes,
         detect_cpu_s=time.process_time() - begin,
-        interrupted=interrupted,
     )

@@ -189,7 +189,8 @@ def facts_of(data: CameraImuInput, fit: libloc.CameraImuFit, verdict: Verdict) -
         ("knots", f"{1e3 * fit.knot_spacing_s:.2f} ms apart; {fit.knot_reason}"),
         (
             "CPU time",
-            f"reading and search {data.detect_cpu_s:.1f} s, start {fit.start_cpu_s:.2f} s, "
+            (f"reading and search {data.detect_cpu_s:.1f} s, " if data.detect_cpu_s else "")
+            + f"start {fit.start_cpu_s:.2f} s, "
             f"solution {fit.solve_cpu_s:.2f} s ({fit.iterations} steps); memory at most "
             f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB",
         ),
