@@ -1,7 +1,7 @@
 // Finds a calibration target in a picture: its corners with their numbers, to a few hundredths of a pixel.
 // From: one picture, sharp or not. Pixel (0,0) is the centre of the top-left pixel; numbers and frame of the target as
 // in sensors/target.hpp.
-//   checkerboard: the whole board must be seen (OpenCV: Duda and Frese 2018 where the quick search finds nothing)
+//   checkerboard: the whole board must be seen (OpenCV: Duda and Frese 2018 where a quicker search finds nothing)
 //   AprilGrid:    any part of at least two tags. The library apriltag (Wang and Olson 2016) finds closed outlines only,
 //                 and Kalibr's small squares join the outlines of neighbours; so one tag that it finds, in a picture
 //                 whose black was made thinner, is enough: the others are looked for where the grid must go on, and
@@ -24,7 +24,7 @@
 namespace loc {
 
 struct TargetDetectorOptions {
-  /// Also the slow search, of ten times the time, in pictures in which the quick one finds nothing: off for live video.
+  /// Also slower searches, of several times the time, where the quick ones find nothing: off for live video.
   bool thorough = true;
   int min_tags = 2;                   ///< AprilGrid: fewer are no grid; at most the tags of the target are asked for
   double min_contrast = 15;           ///< between black and white [grey levels]

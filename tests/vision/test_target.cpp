@@ -243,6 +243,22 @@ TEST(TargetDetector, LargeAndColouredPictures) {
   EXPECT_LT(errors.rms(), 0.15);
 }
 
+// What is searched in live video is half of a picture of this size, where squares have 6 px.
+TEST(TargetDetector, SmallSquaresAreFoundInLiveVideo) {
+  const Camera camera(radtan_camera());
+  const TargetDetector detector(board_target(), {.thorough = false});
+  const SceneRenderer renderer(board_scene(), radtan_camera(), {.noise_sigma = 2});
+  Random random(5);
+  Errors errors;
+  for (int i = 0; i < 5; ++i) {
+    const Pose3 pose = pose_of(i, kMiddleOfBoard, 2.1);
+    const TargetDetection seen = detector.detect(renderer.render(pose, &random));
+    EXPECT_EQ(seen.view.corners.size(), 54U) << seen.reason;
+    errors.add(seen, board_target(), camera, pose);
+  }
+  EXPECT_LT(errors.rms(), 0.15);
+}
+
 std::filesystem::path opencv_pictures() {
   if (const char* folder = std::getenv("LIBLOC_OPENCV_DOC"); folder != nullptr && *folder != 0) return folder;
   return "/usr/share/doc/opencv-doc/examples/data";
