@@ -1,5 +1,6 @@
 """loc-calibrate camera-imu --live: guidance by itself, and the whole against the real hub."""
 
+import io
 import os
 import re
 import signal
@@ -7,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from contextlib import contextmanager
 
 import lcm
 import loc
@@ -183,6 +185,29 @@ def test_rates_are_those_of_the_last_seconds():
         assert found[1] == pytest.approx(200)
 
 
+class Terminal(io.StringIO):
+    encoding = "utf-8"
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_nothing_is_cut_off_on_a_narrow_terminal():
+    collected = collected_of(Waved(seconds=3))
+    collected.counts.update(
+        {"images.received": 123456, "images.searched": 99999, "images.with_target": 99998}
+    )
+    stream = Terminal()
+    display = live._Display(stream)
+    for advice in ("turn it briskly", "go on"):
+        display.show(collected, None, live.Advice(advice))
+    lines = [re.sub("\x1b\\[[?0-9]*[A-Za-z]", "", line) for line in stream.getvalue().splitlines()]
+    assert max(map(len, lines)) <= 80, lines
+    height = len(lines) // 2
+    assert [lines[height - 1], lines[-1]] == ["turn it briskly", "go on"]
+    assert f"\x1b[{height}A" in stream.getvalue()
+
+
 def test_turning_is_that_of_all_samples():
     """Summed up as they come, without what is no number."""
     collected = live.Collected(Waved(seconds=0.1).target, a_camera())
@@ -243,21 +268,31 @@ def test_no_imu_sample_waits_for_a_slow_detector():
     assert collected.reasons == {"dark": searched}
 
 
-def start(url: str, *arguments) -> subprocess.Popen:
-    return subprocess.Popen(
-        [sys.executable, "-m", "libloc.programs.calibrate", "camera-imu", "--live", "--lcm-url", url]
-        + [str(a) for a in arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"PYTHONUNBUFFERED": "1"},
-        # A test run in the background ignores Ctrl-C, and children inherit that.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
+@contextmanager
+def listening(*arguments):
+    """The program and the URL of a hub that it listens to; neither outlives the test."""
+    with hub() as url:
+        process = subprocess.Popen(
+            [
+                *(sys.executable, "-m", "libloc.programs.calibrate", "camera-imu"),
+                *("--live", "--lcm-url", url, *BOARD, *map(str, arguments)),
+            ],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"PYTHONUNBUFFERED": "1"},
+            # A test run in the background ignores Ctrl-C, and children inherit that.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        )
+        with process:
+            try:
+                yield process, url
+            finally:
+                process.kill()  # where it still runs
 
 
 class Played:
-    """A rig whose messages are sent eight times as fast as they came."""
+    """A rig whose messages are sent four times as fast as they came."""
 
     def __init__(self, seconds: float, turning: tuple[float, float, float] = (0.5, 0.5, 0.9)) -> None:
         self.rig = Waved(
@@ -285,16 +320,14 @@ class Played:
             self._messages.append((t, libloc.IMAGE_CHANNEL, p.encode()))
         self._messages.sort()
 
-    def send(self, url: str, process: subprocess.Popen, end: str = "") -> None:
-        """As long as it listens."""
+    def send(self, url: str, first_s: float = 0.0, last_s: float = 1e9, end: str = "") -> None:
         sender = lcm.LCM(url)
         begin = time.monotonic()
         for t, channel, data in self._messages:
-            at = begin + (t - self._messages[0][0]) * 1e-9 / 8
-            time.sleep(max(0.0, at - time.monotonic()))
-            sender.publish(channel, data)
-            if channel == libloc.IMAGE_CHANNEL and process.poll() is not None:
-                return
+            since_s = (t - self._messages[0][0]) * 1e-9
+            if first_s <= since_s < last_s:
+                time.sleep(max(0.0, begin + (since_s - first_s) / 4 - time.monotonic()))
+                sender.publish(channel, data)
         if end:
             status = loc.source_status_t()
             status.state, status.message = status.STATE_ENDED, end
@@ -310,12 +343,10 @@ def played() -> Played:
 def test_the_whole_over_lcm_and_again_from_what_was_kept(played, tmp_path, capsys):
     rig = played.rig
     libloc.write_rig(tmp_path / "rig.yaml", rig.rig())
-    with hub() as url:
-        process = start(
-            url, *BOARD, "--rig", tmp_path / "rig.yaml", "--out", tmp_path / "out.yaml", "--report", tmp_path
-        )
+    out_and_report = ("--out", tmp_path / "out.yaml", "--report", tmp_path)
+    with listening("--rig", tmp_path / "rig.yaml", *out_and_report) as (process, url):
         wait_for(process, "target in 0 of 0")  # it listens
-        played.send(url, process, "the recording has ended")
+        played.send(url, end="the recording has ended")
         out, progress = process.communicate(timeout=60)
     assert process.returncode == 0, out + progress
     assert "the recording has ended" in progress
@@ -345,14 +376,12 @@ def test_the_whole_over_lcm_and_again_from_what_was_kept(played, tmp_path, capsy
 def test_what_came_is_used_when_it_is_interrupted_or_the_time_is_over(played, tmp_path, ctrl_c):
     rig = played.rig
     libloc.write_rig(tmp_path / "rig.yaml", rig.rig())
-    with hub() as url:
-        process = start(
-            url,
-            *(*BOARD, "--rig", tmp_path / "rig.yaml", "--out", tmp_path / "out.yaml"),
-            *("--patience", 100, "--duration", 100 if ctrl_c else 3),
-        )
+    with listening(
+        *("--rig", tmp_path / "rig.yaml", "--out", tmp_path / "out.yaml"),
+        *("--patience", 100, "--duration", 100 if ctrl_c else 5),
+    ) as (process, url):
         wait_for(process, "target in 0 of 0")
-        played.send(url, process)
+        played.send(url)
         if ctrl_c:
             # With a camera of 0 Hz: all that was sent has come.
             wait_for(process, "camera 0 Hz, IMU 0 Hz")
@@ -367,26 +396,29 @@ def test_what_came_is_used_when_it_is_interrupted_or_the_time_is_over(played, tm
 
 
 @needs_vision
+@pytest.mark.slow
 def test_it_ends_when_it_knows_enough(tmp_path):
-    played = Played(36, (0.8, 0.8, 1.2))
+    played = Played(27, (0.8, 0.8, 1.2))
     libloc.write_rig(tmp_path / "rig.yaml", played.rig.rig())
-    with hub() as url:
-        process = start(url, *BOARD, "--rig", tmp_path / "rig.yaml")
+    with listening("--rig", tmp_path / "rig.yaml", "--duration", 60, "--patience", 100) as (process, url):
         first = wait_for(process, "target in 0 of 0")
-        played.send(url, process)
+        # It solves after 8 s of data and every 8 s from there on: each part goes on when that is done.
+        played.send(url, 0, 10)
+        wait_for(process, "known to")
+        played.send(url, 10, 18.5)
+        wait_for(process, "nearly there")
+        played.send(url, 18.5)
         out, progress = process.communicate(timeout=60)
     assert process.returncode == 0, out + progress
     assert "collecting ended: enough now" in progress
     assert "not solved yet" in first[-1]
-    assert "known to" in progress
     assert "No rig file was named with --out" in out
 
 
 def test_silence_is_named(tmp_path, capsys):
     rig = Waved(seconds=1)
     libloc.write_rig(tmp_path / "rig.yaml", rig.rig())
-    with hub() as url:
-        process = start(url, *BOARD, "--rig", tmp_path / "rig.yaml", "--patience", 1)
+    with listening("--rig", tmp_path / "rig.yaml", "--patience", 1) as (process, _):
         out, progress = process.communicate(timeout=30)
     assert process.returncode == 1, out
     assert f"nothing came on {libloc.IMAGE_CHANNEL}" in progress

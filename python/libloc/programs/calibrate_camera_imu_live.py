@@ -29,7 +29,7 @@ from libloc.lcm_receiver import LcmReceiver
 from libloc.programs.arguments import add_collecting, add_lcm_url
 from libloc.programs.calibrate_camera_imu_turns import CameraTurns
 from libloc.programs.calibrate_images import of_message
-from libloc.programs.calibrate_live import map_of_cells
+from libloc.programs.calibrate_live import Screen, map_of_cells
 from libloc.programs.calibrate_plots import new_figure
 
 _MESSAGES: Any = loc  # lcm-gen writes no types
@@ -282,7 +282,7 @@ class _Display:
         self._stream = stream
         self._rates = Rates()
         self._terminal = stream.isatty()
-        self._height = 0
+        self._screen = Screen(stream)
 
     def show(self, collected: Collected, fit: libloc.CameraImuFit | None, advice: Advice) -> None:
         spread, weakest = collected.turning()
@@ -290,26 +290,20 @@ class _Display:
         known = "not solved yet"
         if fit is not None:
             known = "known to {:.2g} deg, {:.2g} mm, {:.2g} ms".format(*deviations(fit))
-        head = (
+        came = (
             f"{collected.seconds():4.0f} s  camera {camera_hz:.0f} Hz, IMU {imu_hz:.0f} Hz  "
             f"target in {collected.counts['images.with_target']} of {collected.counts['images.searched']} "
-            f"pictures, {collected.skipped()} skipped  turning {' '.join(f'{x:.2f}' for x in spread)} "
-            f"(least {np.linalg.norm(weakest):.2f}) rad/s  {100 * collected.coverage():.0f} % of the image  "
-            f"{known}"
+            f"pictures, {collected.skipped()} skipped"
+        )
+        turned = (
+            f"turning {' '.join(f'{x:.2f}' for x in spread)} "
+            f"(least {np.linalg.norm(weakest):.2f}) rad/s  {100 * collected.coverage():.0f} % of the image"
         )
         if not self._terminal:
-            print(f"{head}  {advice.text}", file=self._stream, flush=True)
+            print(came, turned, known, advice.text, sep="  ", file=self._stream, flush=True)
             return
-        lines = [
-            head,
-            *(f"  {line}" for line in map_of_cells(collected.cells, (1, 10, 100), self._stream.encoding)),
-            advice.text,
-        ]
-        up = f"\x1b[{self._height}A" if self._height else ""
-        self._height = len(lines)
-        # Long lines are cut off, not wrapped: the cursor goes up by lines of the screen.
-        text = "\n".join(f"\x1b[2K{line}" for line in lines)
-        print(f"{up}\x1b[?7l{text}\x1b[?7h", file=self._stream, flush=True)
+        cells = map_of_cells(collected.cells, (1, 10, 100), self._stream.encoding)
+        self._screen.show([came, turned, known, *(f"  {line}" for line in cells), advice.text])
 
 
 def plot_progress(collected: Collected, advice: Advice) -> Figure:

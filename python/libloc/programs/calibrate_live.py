@@ -129,13 +129,28 @@ def coverage_map(coverage: NDArray[np.int32], encoding: str | None) -> list[str]
     return map_of_cells(coverage[::-1], (1, 5, 20), encoding)
 
 
+class Screen:
+    """Lines of a terminal that are written over and over."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._height = 0
+
+    def show(self, lines: list[str]) -> None:
+        up = f"\x1b[{self._height}A" if self._height else ""
+        self._height = len(lines)
+        # Long lines are cut off, not wrapped: the cursor goes up by lines of the screen.
+        text = "\n".join(f"\x1b[2K{line}" for line in lines)
+        print(f"{up}\x1b[?7l{text}\x1b[?7h", file=self._stream, flush=True)
+
+
 class Progress:
     """One line a second; on a terminal a map of the directions that is drawn over and over."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self._terminal = stream.isatty()
-        self._height = 0
+        self._screen = Screen(stream)
         self._next = 0.0
 
     def show(
@@ -154,14 +169,8 @@ class Progress:
         if not self._terminal:
             print(f"{head}  {advice.text}", file=self._stream, flush=True)
             return
-        lines = [
-            head,
-            *(f"  {line}" for line in coverage_map(fit.coverage, self._stream.encoding)),
-            advice.text,
-        ]
-        up = f"\x1b[{self._height}A" if self._height else ""
-        self._height = len(lines)
-        print(up + "\n".join(f"\x1b[2K{line}" for line in lines), file=self._stream, flush=True)
+        cells = coverage_map(fit.coverage, self._stream.encoding)
+        self._screen.show([head, *(f"  {line}" for line in cells), advice.text])
 
 
 def write_picture(
