@@ -60,28 +60,6 @@ class Smaller {
   cv::Mat picture_;
 };
 
-// Black squares of a picture with one threshold are found quickest. With thresholds for each place OpenCV tries 56
-// times instead of 16: up to 0.7 s in a small picture of a part of the board, seconds in a large one. What that would
-// find the search for saddles finds nearly always, sooner, so that it comes last.
-bool search(const cv::Mat& gray, const cv::Size& size, bool thorough, Corners& corners) {
-  constexpr int kEachPlace = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE;
-  const Smaller small(gray, shrink_to(gray, kQuickSide));
-  if (cv::findChessboardCorners(small.picture(), size, corners, cv::CALIB_CB_FAST_CHECK)) {
-    small.put_back(corners);
-    return true;
-  }
-  const Smaller searched(gray, shrink_to(gray, thorough ? kSearchSide : kQuickSide));
-  if (cv::findChessboardCornersSB(searched.picture(), size, corners, cv::CALIB_CB_NORMALIZE_IMAGE)) {
-    searched.put_back(corners);
-    return true;
-  }
-  if (!thorough || !cv::findChessboardCorners(small.picture(), size, corners, kEachPlace | cv::CALIB_CB_FAST_CHECK)) {
-    return false;
-  }
-  small.put_back(corners);
-  return true;
-}
-
 // Shortest side of a square, and whether the corners are a regular grid: each between its neighbours.
 bool regular(const Grid& grid, double& spacing) {
   spacing = 1e9;
@@ -99,6 +77,33 @@ bool regular(const Grid& grid, double& spacing) {
     }
   }
   return spacing > 2;
+}
+
+// Black squares of a picture with one threshold are found quickest. With thresholds for each place OpenCV tries 56
+// times instead of 16: up to 0.7 s in a small picture of a part of the board, seconds in a large one. What that would
+// find the search for saddles finds nearly always, sooner, so that it comes last. One that finds corners which are no
+// grid has found nothing. Gives the spacing of regular(), too.
+std::optional<Grid> search(const cv::Mat& gray, const cv::Size& size, bool thorough, double& spacing) {
+  constexpr int kEachPlace = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE;
+  Grid grid{{}, size.width, size.height};
+  const auto is_grid = [&](bool found, const Smaller& searched) {
+    if (!found || grid.corners.size() != static_cast<std::size_t>(size.area())) return false;
+    searched.put_back(grid.corners);
+    return regular(grid, spacing);
+  };
+  const Smaller small(gray, shrink_to(gray, kQuickSide));
+  const auto squares = [&](int flags) {
+    return is_grid(cv::findChessboardCorners(small.picture(), size, grid.corners, flags | cv::CALIB_CB_FAST_CHECK),
+                   small);
+  };
+  const auto saddles = [&](const Smaller& searched) {
+    return is_grid(cv::findChessboardCornersSB(searched.picture(), size, grid.corners, cv::CALIB_CB_NORMALIZE_IMAGE),
+                   searched);
+  };
+  const bool found =
+      squares(0) || (thorough ? saddles({gray, shrink_to(gray, kSearchSide)}) || squares(kEachPlace) : saddles(small));
+  if (!found) return std::nullopt;
+  return grid;
 }
 
 // Mean brightness of the squares inside the grid whose column + row is even, less that of the odd ones.
@@ -157,14 +162,14 @@ bool among_neighbours(const Grid& grid, const std::vector<bool>& good, int colum
 TargetDetection find_checkerboard(const cv::Mat& gray, const CalibrationTarget& target,
                                   const TargetDetectorOptions& options) {
   TargetDetection out;
-  Grid grid{{}, target.columns, target.rows};
-  const bool found = search(gray, {grid.columns, grid.rows}, options.thorough, grid.corners);
-  const std::string size = std::to_string(target.columns) + " x " + std::to_string(target.rows);
   double spacing = 0;
-  if (!found || grid.corners.size() != static_cast<std::size_t>(target.corner_count()) || !regular(grid, spacing)) {
-    out.reason = "no checkerboard of " + size + " inner corners";
+  std::optional<Grid> found = search(gray, {target.columns, target.rows}, options.thorough, spacing);
+  if (!found) {
+    out.reason =
+        "no checkerboard of " + std::to_string(target.columns) + " x " + std::to_string(target.rows) + " inner corners";
     return out;
   }
+  Grid grid = std::move(*found);
   const auto contrast = even_less_odd(gray, grid);
   if (target.columns > 2 && target.rows > 2 && !(contrast && std::abs(*contrast) >= options.min_contrast)) {
     out.reason = "the checkerboard has too little contrast";
