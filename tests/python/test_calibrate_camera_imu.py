@@ -341,7 +341,8 @@ def test_real_recording(tmp_path, capsys):
         *(folder / "cam0_corners.csv", folder / "imu0.csv", "--target", "aprilgrid", "6x6", "0.088", "0.3"),
         *("--rig", path, "--out", path),
     )
-    assert "Usable: where cam0 sits" in text
+    assert "Doubtful: where cam0 sits" in text
+    assert "This recording would change the intrinsics by up to" in text
     assert "the rig says nothing of the IMU's noise" in text
     assert "nobody has measured" not in text  # the same again
     (found,) = libloc.read_rig(path).cameras

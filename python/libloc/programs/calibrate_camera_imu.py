@@ -265,21 +265,12 @@ def _apply(
         camera.time_offset_s = found.time_offset_s
         if refined:
             camera.intrinsics_px, camera.distortion = found.camera.intrinsics_px, found.camera.distortion
-            quality = libloc.IntrinsicsQuality()
+            quality = found.camera.intrinsics_quality
             quality.verdict, quality.reasons = verdict, reasons
-            quality.method, quality.pictures = "camera-imu", sum(view.used for view in found.views)
-            quality.intrinsics_sigma_px, quality.distortion_sigma = (
-                found.intrinsics_sigma[:4],
-                found.intrinsics_sigma[4:],
-            )
             camera.intrinsics_quality = quality
-        mounting = libloc.MountingQuality()
+        # The verdict of the solution and of the recording that it is from.
+        mounting = found.camera.mounting_quality
         mounting.verdict, mounting.reasons = verdict, reasons
-        mounting.method, mounting.pictures = "camera-imu", sum(view.used for view in found.views)
-        mounting.set_deviations(found.camera.T_body_camera, found.covariance)
-        if found.line_delay_s.estimated:
-            mounting.line_delay_s = found.line_delay_s.value
-            mounting.line_delay_sigma_s = found.line_delay_s.sigma
         camera.mounting_quality = mounting
         if at is None:
             cameras.append(camera)

@@ -177,7 +177,7 @@ def facts_of(data: CameraImuInput, fit: libloc.CameraImuFit, verdict: Verdict) -
             f"({gravity}) m/s², direction ± {np.rad2deg(fit.gravity_direction_sigma):.2g} deg; size "
             + _check_text(fit.gravity_size, 1, "m/s²"),
         ),
-        ("size of the target", f"{_check_text(fit.target_scale, 1, 'of what was said')}, by the accelerometer"),
+        ("target's size by the accelerometer", _check_text(fit.target_scale, 1, "of what was said")),
         ("bias of the gyroscope", " ".join(f"{x:.5f}" for x in bias[:3]) + " rad/s (mean)"),
         ("bias of the accelerometer", " ".join(f"{x:.4f}" for x in bias[3:]) + " m/s² (mean)"),
         (
