@@ -174,6 +174,7 @@ struct CameraImuFit {
   double gravity_direction_sigma = 0;                        ///< [rad]
   CameraImuCheck gravity_size;                               ///< [m/s^2]
   /// The target's true size over what it was said to be, by the accelerometer. Never estimated: a ruler knows better.
+  /// NaN where gravity's size and the accelerometer's scale are both estimated.
   CameraImuCheck target_scale;
   /// reading = matrix * what the sensor feels + bias; of the gyroscope all entries, of the accelerometer a lower
   /// triangle (body is the frame in which it is one). Where they were held, what one step says is for a warning, not

@@ -31,6 +31,7 @@ constexpr double kByChance = 2;  // deviations
 constexpr double kSignificant = 2.5;
 constexpr double kOfMany = 1.4;           // of that, for the largest of a matrix
 constexpr double kMovedFar = 3;           // deviations
+constexpr double kLeastKnown = 0.2;       // deviation of a scale, that says anything of it
 constexpr double kRollingShutter = 1e-3;  // [s] from the first row to the last
 constexpr double kDrift = 1e-4;           // [s] over the recording
 constexpr double kIntrinsicsPull = 1;     // [px]
@@ -391,6 +392,8 @@ void put_deviations(const SharedEquations& e, const Part& estimated, const Camer
   const bool matrices = e.estimated.gyro_matrix >= 0;
   // A scale of the accelerometer is in gravity's size as well.
   fit.target_scale = check_of(e, estimated, e.all.target_scale, false, state.target_scale, e.all.gravity_size);
+  // Beside gravity and the accelerometer's scale there is nothing left to tell it by.
+  if (!(fit.target_scale.sigma < kLeastKnown)) fit.target_scale = {};
   fit.gyroscope_matrix = check_of(e, estimated, e.all.gyro_matrix, matrices, state.gyro_matrix, false);
   fit.accelerometer_matrix = check_of(e, estimated, e.all.accel_matrix, matrices, state.accel_matrix, true);
 }

@@ -295,6 +295,9 @@ TEST(CameraImu, MatricesOfTheImuAndGravityAreFound) {
   const CameraImuFit found = calibrate(plain, {.gravity = 9.75, .estimate_gravity = true});
   EXPECT_NEAR(found.gravity_size.value, 9.80665, 4 * found.gravity_size.sigma);
   EXPECT_NEAR(found.gravity_target.norm(), found.gravity_size.value, 1e-9);
+  EXPECT_NEAR(found.target_scale.value, 1, 4 * found.target_scale.sigma);
+  const CameraImuFit both = calibrate(plain, {.estimate_gravity = true, .estimate_imu_matrices = true});
+  EXPECT_TRUE(std::isnan(both.target_scale.value));
 }
 
 // One thing that was held wrongly is told by its name and its size, and nothing else is accused; where it moves the

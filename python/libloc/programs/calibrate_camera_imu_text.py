@@ -169,6 +169,10 @@ def facts_of(data: CameraImuInput, fit: libloc.CameraImuFit, verdict: Verdict) -
         ]
         if np.isfinite(camera.line_delay_s.value):
             facts.append((f"{name}: line delay", _check_text(camera.line_delay_s, 1e6, "us a row")))
+    if np.isfinite(fit.target_scale.value):
+        facts.append(
+            ("target's size by the accelerometer", _check_text(fit.target_scale, 1, "of what was said"))
+        )
     gravity = ", ".join(f"{x:.4f}" for x in fit.gravity_target)
     bias = np.mean(fit.biases, axis=0)
     facts += [
@@ -177,7 +181,6 @@ def facts_of(data: CameraImuInput, fit: libloc.CameraImuFit, verdict: Verdict) -
             f"({gravity}) m/s², direction ± {np.rad2deg(fit.gravity_direction_sigma):.2g} deg; size "
             + _check_text(fit.gravity_size, 1, "m/s²"),
         ),
-        ("target's size by the accelerometer", _check_text(fit.target_scale, 1, "of what was said")),
         ("bias of the gyroscope", " ".join(f"{x:.5f}" for x in bias[:3]) + " rad/s (mean)"),
         ("bias of the accelerometer", " ".join(f"{x:.4f}" for x in bias[3:]) + " m/s² (mean)"),
         (
