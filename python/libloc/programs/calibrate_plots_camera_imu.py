@@ -196,11 +196,16 @@ def plot_reprojection(camera: libloc.CameraImuCamera) -> Figure:
     ring = np.clip(np.digitize(radius, edges) - 1, 0, 11)
     # Half of the distances are below 1.177 sigma, whatever the few are that are far off.
     sigmas = [np.median(lengths[ring == k]) / 1.177 if (ring == k).sum() >= 10 else np.nan for k in range(12)]
-    radial.plot((edges[:-1] + edges[1:]) / 2, sigmas, "o-", color=USED)
+    middles = (edges[:-1] + edges[1:]) / 2
+    radial.plot(middles, sigmas, "o-", color=USED)
+    top = 4 * float(np.nanmedian(sigmas)) if np.isfinite(sigmas).any() else 1.0
+    for middle, value in zip(middles, sigmas, strict=True):
+        if value > top:
+            radial.annotate(f"{value:.2g}", (middle, top), ha="right", va="top", color=DROPPED)
     radial.set(
         xlabel="from the principal point [px]",
         ylabel="sigma of a coordinate, by the median [px]",
-        ylim=(0, None),
+        ylim=(0, min(top, 1.1 * np.nanmax(sigmas)) if np.isfinite(sigmas).any() else None),
     )
     for axes in (scatter, radial):
         axes.grid(alpha=0.3)
@@ -215,14 +220,18 @@ def _draw_cells(axes: Axes, pixels: Array, residuals: Array, factor: float, size
     few = slice(None, None, max(1, len(pixels) // (_SHOWN // 3)))
     axes.quiver(*pixels[few].T, *(factor * residuals[few]).T, width=0.001, color="0.65", **style)
     cell = (pixels / size * (16, 10)).astype(int).clip(0, (15, 9)) @ (1, 16)
+    longest, cut = 1.5 * size[0] / 16, 0  # a few wild corners must not hide the others
     for k in np.unique(cell):
         inside = cell == k
         if inside.sum() < 30:
             continue
         start = pixels[inside].mean(axis=0)
         median = 3 * factor * np.median(residuals[inside], axis=0)
-        axes.quiver(*start, *median, width=0.003, color=DROPPED, **style)
-    axes.text(0.01, 0.01, "medians three times more", transform=axes.transAxes, fontsize=8, color=DROPPED)
+        beyond = np.linalg.norm(median) / longest
+        cut += beyond > 1
+        axes.quiver(*start, *(median / max(beyond, 1.0)), width=0.003, color=DROPPED, **style)
+    text = "medians three times more" + (f", {cut} of them cut" if cut else "")
+    axes.text(0.01, 0.01, text, transform=axes.transAxes, fontsize=8, color=DROPPED)
 
 
 def plot_views(camera: libloc.CameraImuCamera, seconds: Array | None) -> Figure:
