@@ -35,6 +35,7 @@ constexpr double kLeastKnown = 0.2;       // deviation of a scale, that says any
 constexpr double kRollingShutter = 1e-3;  // [s] from the first row to the last
 constexpr double kDrift = 1e-4;           // [s] over the recording
 constexpr double kIntrinsicsPull = 1;     // [px]
+constexpr double kLeastIntrinsicsSigma = 1e-6;
 
 void append(std::vector<int>& out, int first, int size) {
   for (int i = 0; i < size && first >= 0; ++i) out.push_back(first + i);
@@ -121,26 +122,50 @@ Part with_further(const SharedEquations& e, const Part& estimated, std::span<con
   return solve_for(e, std::move(places));
 }
 
+// The solution, and with it what is known of intrinsics that were held: an error of theirs within its deviation must
+// not be taken for one of something else.
+struct Solution {
+  SharedEquations known;  // with the deviations of intrinsics as measurements
+  Part estimated;
+  Part free;  // estimated, and those intrinsics; of known
+};
+
+Solution solution_of(const SharedEquations& e, std::span<const Vector8d> intrinsics_sigma) {
+  Solution out{e, solve_for(e, estimated_places(e)), {}};
+  std::vector<int> places = out.estimated.places;
+  for (std::size_t c = 0; c < e.all.cameras.size(); ++c) {
+    if (e.estimated.cameras[c].intrinsics >= 0) continue;
+    const SharedLayout::OfCamera& all = e.all.cameras[c];
+    append(places, all.intrinsics, all.intrinsics_size);
+    for (int i = 0; i < all.intrinsics_size; ++i) {
+      const double sigma = std::max(intrinsics_sigma[c][i], kLeastIntrinsicsSigma);
+      out.known.information(all.intrinsics + i, all.intrinsics + i) += 1 / (sigma * sigma);
+    }
+  }
+  out.free = solve_for(out.known, std::move(places));
+  return out;
+}
+
 // @param also what is to be free besides, because its errors look alike
-CameraImuCheck check_of(const SharedEquations& e, const Part& estimated, int place, bool was_estimated, double value,
-                        int also = -1) {
+CameraImuCheck check_of(const Solution& solution, int place, bool was_estimated, double value, int also = -1) {
   CameraImuCheck out;
   if (place < 0) return out;
   out.estimated = was_estimated;
-  const Part with = was_estimated ? Part{} : with_further(e, estimated, std::array{place, also});
+  const Part with =
+      was_estimated ? solution.estimated : with_further(solution.known, solution.free, std::array{place, also});
   out.value = was_estimated ? value : value + with.step[with.at(place)];
-  out.sigma = was_estimated ? estimated.sigma(place) : with.sigma(place);
+  out.sigma = with.sigma(place);
   return out;
 }
 
 // Row by row; the upper half of a lower triangle is zero.
-CameraImuMatrixCheck check_of(const SharedEquations& e, const Part& estimated, int place, bool was_estimated,
-                              const Eigen::Matrix3d& value, bool lower) {
+CameraImuMatrixCheck check_of(const Solution& solution, int place, bool was_estimated, const Eigen::Matrix3d& value,
+                              bool lower) {
   CameraImuMatrixCheck out;
   if (place < 0) return out;
   std::vector<int> places;
   append(places, place, lower ? 6 : 9);
-  const Part with = was_estimated ? estimated : with_further(e, estimated, places);
+  const Part with = was_estimated ? solution.estimated : with_further(solution.known, solution.free, places);
   out.estimated = was_estimated;
   out.value = value;
   out.sigma.setZero();
@@ -184,6 +209,7 @@ struct Suspect {
   // Of the solution with it free: what it says, empty where that is no more than chance or too little to matter.
   std::function<std::string(const Part&)> says;
   bool always_warn = false;
+  bool intrinsics = false;  // what is known of them is doubted
 };
 
 bool beyond_chance(const Part& with, int place, double floor) {
@@ -261,7 +287,7 @@ std::vector<Suspect> suspects_of(const SharedEquations& e, const CameraImuState&
       std::vector<int> places;
       append(places, all.intrinsics, all.intrinsics_size);
       const Vector8d sigma = intrinsics_sigma[c];
-      out.push_back({places, [=](const Part& with) { return intrinsics_doubt(with, places, sigma, of); }});
+      out.push_back({places, [=](const Part& with) { return intrinsics_doubt(with, places, sigma, of); }, false, true});
     }
   }
   add(e.all.gravity_size, e.estimated.gravity_size >= 0, [=](const Part& with) {
@@ -289,11 +315,13 @@ std::vector<Suspect> suspects_of(const SharedEquations& e, const CameraImuState&
   return out;
 }
 
-// What a mounting would move by, in words, and whether that is more than was said of it.
-std::string moves_of(const SharedEquations& e, const Part& with, const CameraImuFit& fit, bool& too_far) {
+// What a mounting moves by from one solution to the other, in words, and whether that is more than was said of it.
+std::string moves_of(const SharedEquations& e, const Part& from, const Part& to, const CameraImuFit& fit,
+                     bool& too_far) {
   Vector7d most = Vector7d::Zero();
   for (std::size_t c = 0; c < fit.cameras.size(); ++c) {
-    const Vector7d step = with.step.segment<7>(with.at(e.all.cameras[c].first));
+    const int first = e.all.cameras[c].first;
+    const Vector7d step = to.step.segment<7>(to.at(first)) - from.step.segment<7>(from.at(first));
     if ((step.array().abs() > kMovedFar * fit.cameras[c].sigma.array()).any()) too_far = true;
     if (step.segment<3>(kShift).norm() >= most.segment<3>(kShift).norm()) most = step;
   }
@@ -303,31 +331,44 @@ std::string moves_of(const SharedEquations& e, const Part& with, const CameraImu
 }
 
 // One fault is seen in many quantities: the one that explains most is taken first, and the others are looked at with
-// that one free.
-bool put_doubts(const SharedEquations& e, const Part& estimated, std::vector<Suspect> suspects, const CameraImuFit& fit,
-                Quality& q) {
-  Part free = estimated;
+// that one free. @returns whether there is any.
+bool put_doubts(const SharedEquations& e, const Solution& solution, std::vector<Suspect> suspects,
+                const CameraImuFit& fit, Quality& q) {
+  SharedEquations known = solution.known;
+  Part free = solution.free;
+  const std::size_t all = suspects.size();
   while (!suspects.empty()) {
     std::size_t best = suspects.size();
     Part with_best;
+    SharedEquations known_best;
     std::string text;
     for (std::size_t i = 0; i < suspects.size(); ++i) {
-      Part with = with_further(e, free, suspects[i].places);
+      SharedEquations own = known;
+      if (suspects[i].intrinsics) {
+        for (const int place : suspects[i].places) own.information(place, place) = e.information(place, place);
+      }
+      Part with = with_further(own, free, suspects[i].places);
       if (!with.step.allFinite()) continue;
       const std::string says = suspects[i].says(with);
       if (says.empty() || (best < suspects.size() && with.gain <= with_best.gain)) continue;
       best = i;
       text = says;
       with_best = std::move(with);
+      known_best = std::move(own);
     }
     if (best == suspects.size()) break;
     bool warn = suspects[best].always_warn;
-    text += moves_of(e, with_best, fit, warn) + ".";
+    std::vector<int> others = with_best.places;
+    std::erase_if(others, [&](int place) {
+      return std::ranges::find(suspects[best].places, place) != suspects[best].places.end();
+    });
+    text += moves_of(e, solve_for(known, std::move(others)), with_best, fit, warn) + ".";
     q.lower_to(warn ? Verdict::kWarn : Verdict::kFair, text);
     free = std::move(with_best);
+    known = std::move(known_best);
     suspects.erase(suspects.begin() + static_cast<std::ptrdiff_t>(best));
   }
-  return free.places.size() > estimated.places.size();
+  return suspects.size() < all;
 }
 
 // @param doubted something that was held is doubted
@@ -367,8 +408,9 @@ void judge_camera(const CameraImuCamera& camera, bool several, bool doubted, Qua
   }
 }
 
-void put_deviations(const SharedEquations& e, const Part& estimated, const CameraImuState& state,
+void put_deviations(const SharedEquations& e, const Solution& solution, const CameraImuState& state,
                     std::span<const Vector8d> intrinsics_sigma, CameraImuFit& fit) {
+  const Part& estimated = solution.estimated;
   for (std::size_t c = 0; c < fit.cameras.size(); ++c) {
     CameraImuCamera& camera = fit.cameras[c];
     const SharedLayout::OfCamera& all = e.all.cameras[c];
@@ -383,28 +425,28 @@ void put_deviations(const SharedEquations& e, const Part& estimated, const Camer
     camera.covariance = grown.asDiagonal() * estimated.covariance.block<7, 7>(at, at) * grown.asDiagonal();
     put_intrinsics(e, estimated, c, intrinsics_sigma[c], camera, camera.covariance);
     camera.sigma = camera.covariance.diagonal().cwiseSqrt();
-    camera.line_delay_s = check_of(e, estimated, all.line_delay, own.line_delay >= 0, state.cameras[c].line_delay_s);
-    camera.offset_drift = check_of(e, estimated, all.drift, own.drift >= 0, state.cameras[c].drift);
+    camera.line_delay_s = check_of(solution, all.line_delay, own.line_delay >= 0, state.cameras[c].line_delay_s);
+    camera.offset_drift = check_of(solution, all.drift, own.drift >= 0, state.cameras[c].drift);
   }
   fit.gravity_direction_sigma =
       std::hypot(estimated.sigma(e.all.gravity), estimated.sigma(e.all.gravity + 1)) / std::numbers::sqrt2;
-  fit.gravity_size = check_of(e, estimated, e.all.gravity_size, e.estimated.gravity_size >= 0, state.gravity.norm());
+  fit.gravity_size = check_of(solution, e.all.gravity_size, e.estimated.gravity_size >= 0, state.gravity.norm());
   const bool matrices = e.estimated.gyro_matrix >= 0;
   // A scale of the accelerometer is in gravity's size as well.
-  fit.target_scale = check_of(e, estimated, e.all.target_scale, false, state.target_scale, e.all.gravity_size);
+  fit.target_scale = check_of(solution, e.all.target_scale, false, state.target_scale, e.all.gravity_size);
   // Beside gravity and the accelerometer's scale there is nothing left to tell it by.
   if (!(fit.target_scale.sigma < kLeastKnown)) fit.target_scale = {};
-  fit.gyroscope_matrix = check_of(e, estimated, e.all.gyro_matrix, matrices, state.gyro_matrix, false);
-  fit.accelerometer_matrix = check_of(e, estimated, e.all.accel_matrix, matrices, state.accel_matrix, true);
+  fit.gyroscope_matrix = check_of(solution, e.all.gyro_matrix, matrices, state.gyro_matrix, false);
+  fit.accelerometer_matrix = check_of(solution, e.all.accel_matrix, matrices, state.accel_matrix, true);
 }
 
 }  // namespace
 
 void conclude(const SharedEquations& e, const CameraImuState& state, const CameraImuOptions& options,
               std::span<const Vector8d> intrinsics_sigma, bool too_fast, double length_s, CameraImuFit& fit) {
-  const Part estimated = solve_for(e, estimated_places(e));
-  if (!estimated.by_noise.allFinite()) throw DataError("the recording does not determine the calibration");
-  put_deviations(e, estimated, state, intrinsics_sigma, fit);
+  const Solution solution = solution_of(e, intrinsics_sigma);
+  if (!solution.estimated.by_noise.allFinite()) throw DataError("the recording does not determine the calibration");
+  put_deviations(e, solution, state, intrinsics_sigma, fit);
   Quality& q = fit.quality;
   if (!fit.converged) {
     q.lower_to(Verdict::kRefused, "The solution has not settled" +
@@ -412,8 +454,7 @@ void conclude(const SharedEquations& e, const CameraImuState& state, const Camer
                                       ": give it more time, or a better recording.");
   }
   // First what was held wrongly: it spoils all that follows.
-  const bool doubted =
-      put_doubts(e, estimated, suspects_of(e, state, options, intrinsics_sigma, length_s, fit), fit, q);
+  const bool doubted = put_doubts(e, solution, suspects_of(e, state, options, intrinsics_sigma, length_s, fit), fit, q);
   const auto noisy = [&](double scale, const std::string& sensor) {
     if (scale < kDoubtfulNoise) return;
     q.lower_to(scale < kNoNoise ? Verdict::kFair : Verdict::kWarn,
