@@ -5,9 +5,9 @@ calibration finds it in EuRoC's recording of an AprilGrid; and with only the tur
 
 FOLDER: holds euroc-v101-tracks and euroc-cam-imu-calibration (default: $LIBLOC_DATA). One ATE is luck by some
 millimetres, so SLAM begins at several times; the place that Basalt publishes for this rig stands beside it.
-Between 8.9 and 9.3 s the moving start is fragile: a microsecond more or less, a frame more or less, and it may
-end in another minimum, with any mounting. Such runs (ATE beyond 250 mm) are counted, and means are over the
-begins at which none of the mountings has one.
+Between 8.9 and 9.3 s the moving start is fragile: a microsecond more or less, a frame more or less, and it
+may end in another minimum, with any mounting. Such runs (ATE beyond 250 mm) are counted, and means are over
+the begins at which none of the mountings has one.
 Exit code 1: on average the calibrated mounting is worse by more than two standard errors, or the whole
 recording is beyond its bar.
 """
@@ -104,15 +104,14 @@ def main() -> int:
         print(f"  {name:22s}" + "".join(f"{value:8.2f}" for value in row))
     good = (ates <= FAILED_MM).all(axis=0)
     for name, row in zip(mountings, ates, strict=True):
-        print(
-            f"  {name:22s} mean {row[good].mean():6.2f}, median {np.median(row):6.2f}, failed {(row > FAILED_MM).sum()}"
-        )
+        failed = (row > FAILED_MM).sum()
+        print(f"  {name:22s} mean {row[good].mean():6.2f}, median {np.median(row):6.2f}, failed {failed}")
     worse = ates[1, good] - ates[0, good]
     mean, error = worse.mean(), worse.std(ddof=1) / np.sqrt(len(worse))
     ok = ates[1][0] <= ATE_BAR_MM and mean <= 2 * error
     print(
         f"calibrated less EuRoC's: {mean:+.2f} mm on average (standard error {error:.2f}), "
-        f"{ates[1, 0] - ates[0, 0]:+.2f} mm from the first frame; bars: {ATE_BAR_MM} mm from the first frame, "
+        f"{ates[1, 0] - ates[0, 0]:+.2f} mm from the first frame; bars: {ATE_BAR_MM} mm from it, "
         f"on average not worse by two standard errors: {'ok' if ok else 'FAILED'}"
     )
     return 0 if ok else 1
