@@ -6,7 +6,6 @@
 #include <ctime>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <utility>
 
 #include "libloc/calib/camera_bundle.hpp"
@@ -19,7 +18,6 @@
 #include "libloc/calib/least_squares.hpp"
 #include "libloc/core/check.hpp"
 #include "libloc/core/statistics.hpp"
-#include "libloc/geometry/so3.hpp"
 
 namespace loc {
 namespace {
@@ -27,16 +25,12 @@ namespace {
 using calib::CameraImuProblem;
 using calib::CameraImuRecording;
 using calib::CameraImuState;
-using calib::CameraPoseSample;
 using calib::ChainStep;
 using calib::ChainSystem;
 using calib::FrameRow;
 using calib::ImuRow;
 using calib::SharedLayout;
-using Eigen::Vector3d;
 
-constexpr double kMargin = 0.5;         // [s] of IMU samples beyond the pictures
-constexpr double kInside = 0.02;        // [s] that pictures keep from the ends
 constexpr double kSmallDamping = 1e-3;  // beyond, a step is small because it was held back
 constexpr int kNoiseRounds = 2;
 constexpr double kCommonWeight = 20;        // coordinates of corners that the common noise counts for

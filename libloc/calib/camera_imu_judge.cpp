@@ -286,7 +286,7 @@ std::vector<Suspect> suspects_of(const SharedEquations& e, const CameraImuState&
     if (own.intrinsics < 0) {
       std::vector<int> places;
       append(places, all.intrinsics, all.intrinsics_size);
-      const Vector8d sigma = intrinsics_sigma[c];
+      const Vector8d& sigma = intrinsics_sigma[c];  // copied by the capture
       out.push_back({places, [=](const Part& with) { return intrinsics_doubt(with, places, sigma, of); }, false, true});
     }
   }

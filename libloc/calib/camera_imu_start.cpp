@@ -260,8 +260,8 @@ Vector3d MeanRate::between(double from_s, double to_s) const {
   return (integral(to_s) - integral(from_s)) / (to_s - from_s);
 }
 
-GyroTurns::GyroTurns(std::span<const ImuRow> imu, const Vector3d& bias)
-    : rate_(imu), bias_(bias), turns_{Eigen::Quaterniond::Identity()} {
+GyroTurns::GyroTurns(std::span<const ImuRow> imu, Vector3d bias)
+    : rate_(imu), bias_(std::move(bias)), turns_{Eigen::Quaterniond::Identity()} {
   const std::vector<double>& times = rate_.times_s();
   for (std::size_t i = 1; i < times.size(); ++i) {
     const double dt = times[i] - times[i - 1];

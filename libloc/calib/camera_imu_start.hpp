@@ -44,7 +44,7 @@ class MeanRate {
 /// How the gyroscope says that the body turned between any two times.
 class GyroTurns {
  public:
-  GyroTurns(std::span<const ImuRow> imu, const Eigen::Vector3d& bias);
+  GyroTurns(std::span<const ImuRow> imu, Eigen::Vector3d bias);
   /// In the body's axes at the first: R(to) = R(from) turn.
   Eigen::Quaterniond between(double from_s, double to_s) const;
 

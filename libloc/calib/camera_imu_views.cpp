@@ -70,9 +70,11 @@ std::vector<ImuRow> read_imu(std::span<const ImuMeasurement> imu, TimeNs& origin
     if (m.time_ns != kNoTime && m.angular_velocity.allFinite() && m.specific_force.allFinite()) finite.push_back(&m);
   }
   std::vector<TimeNs> times;
+  times.reserve(finite.size());
   for (const ImuMeasurement* m : finite) times.push_back(m->time_ns);
   const std::vector<std::size_t> order = rising(times);
   std::vector<TimeNs> rising_times;
+  rising_times.reserve(order.size());
   for (const std::size_t i : order) rising_times.push_back(times[i]);
   const auto [first, last] = together(rising_times);
   counts.push_back({"imu.skipped.not_finite", std::ssize(imu) - std::ssize(finite)});
