@@ -20,7 +20,8 @@ using Eigen::Vector3d;
 constexpr double kLeastForce = 0.5;  // of gravity, that the mean specific force is
 constexpr double kStartSmoothing = 1e-4;
 constexpr double kWidestPitch = 80 * std::numbers::pi / 180;
-constexpr double kApart = 0.25;  // [s] from the next picture of a camera before, for another camera's to be needed
+constexpr double kApart = 0.25;    // [s] from the next picture of a camera before, for another camera's to be needed
+constexpr double kBridged = 0.45;  // [s] between two pictures, of a camera as slow as may be
 
 std::size_t after(const RoughTrack& track, double t_s) {
   return static_cast<std::size_t>(std::ranges::upper_bound(track.times_s, t_s) - track.times_s.begin());
@@ -46,7 +47,7 @@ std::optional<Vector3d> position_at(const RoughTrack& track, double t_s) {
   if (next == 0 || next == track.times_s.size()) return {};
   const std::size_t last = next - 1;
   const double span = track.times_s[next] - track.times_s[last];
-  if (span > kApart) return {};
+  if (span > kBridged) return {};
   const double share = (t_s - track.times_s[last]) / span;
   return (1 - share) * track.positions[last] + share * track.positions[next];
 }
